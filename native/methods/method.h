@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The one interface of all methods that answer "how much indirect light arrives here?". A method is one folder under
+// methods/ and one line in methods/list.cpp; it never reads Blender's data and never draws.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/cancel.h"
+#include "materials/surface.h"
+#include "scene/changes.h"
+
+namespace afterglow {
+
+struct CommittedScene;
+struct PixelRequest;
+class Film;
+
+using SettingValue = std::variant<bool, int64_t, double, std::string>;
+struct SettingDescription {
+  std::string name, label, description, unit;
+  SettingValue default_value;
+  double min = 0.0, max = 0.0;
+};
+struct MethodDescription {
+  std::string id, label, description;
+  std::vector<SettingDescription> settings;
+  std::vector<std::string> debug_views, statistics;
+};
+
+/// Which light terms a method serves by itself; the Renderer computes the others.
+enum LightTerm : uint32_t { kIndirectDiffuse = 1, kDirect = 2, kSpecular = 4, kEmitted = 8, kAllTerms = 15 };
+struct MethodTraits {
+  uint32_t terms = kIndirectDiffuse;
+  bool layers = false;  // wants the layered filter
+  bool needs_next_frame = false;
+};
+
+struct CachePoint {  // a diffuse lobe that asks for light
+  Vec3 position, normal, face_normal, outgoing;
+  float footprint = 0.0f, segment = 0.0f;  // of a pixel on the surface; length of the ray that came here
+  uint32_t instance = kNone, triangle = kNone, pixel = 0;
+  uint8_t layer = 0;
+  bool translucent = false;  // the lobe gathers from behind
+};
+struct Answer {
+  Rgb light{0.0f};
+  float weight = 0.0f;
+  float relative_error = 0.0f;
+};  // weight 0: a hole
+
+struct Work {
+  StopToken stop;
+  uint64_t seed = 0;
+  uint32_t pass = 0;
+  uint32_t threads = 0;  // 0: all
+};
+
+struct MethodStatistics {
+  std::vector<std::pair<std::string, double>> values;  // records, rays, bytes, seconds a stage, reused, dropped, …
+};
+
+class IndirectMethod {
+ public:
+  virtual ~IndirectMethod() = default;
+  virtual MethodTraits traits() const = 0;
+  virtual void configure(const std::vector<std::pair<std::string, SettingValue>>&) = 0;
+  virtual void update(const CommittedScene&, const SceneChanges&, Work&) = 0;           // invalidate and repair
+  virtual bool refine(const CommittedScene&, Work&) = 0;                                // one whole pass; false: done
+  virtual void prepare(const CommittedScene&, std::span<const CachePoint>, Work&) = 0;  // a wavefront; may insert
+  virtual void gather(const CommittedScene&, std::span<const CachePoint>,
+                      std::span<Answer>) const = 0;  // pure; any thread
+  /// Methods that claim kAllTerms render whole requests; the others never see this call.
+  virtual void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&) = 0;
+  virtual MethodStatistics statistics() const = 0;
+};
+
+const std::vector<MethodDescription>& method_descriptions();
+std::unique_ptr<IndirectMethod> make_method(const std::string& id);  // throws InvalidInput with the list of ids
+
+}  // namespace afterglow

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The geometric facts at a hit, and where the next ray may start. Positions come from barycentric coordinates, not from
+// the ray, so that they lie on the triangle; offsets follow Wächter and Binder 2019 (Ray Tracing Gems, ch. 6).
+#pragma once
+
+#include "rays/ray_caster.h"
+
+namespace afterglow {
+
+struct SurfacePoint {
+  Vec3 position;     // relative to Scene::origin()
+  Vec3 face_normal;  // unit, world, turned to the side that the ray came from
+  Vec3 normal;       // unit shading normal, turned likewise
+  Vec3 outgoing;     // unit, to where the ray came from
+  Vec2 uv{0.0f};     // active map
+  float u = 0.0f, v = 0.0f, t = 0.0f;
+  uint32_t instance = kNone, triangle = kNone;
+  uint32_t material = 0;  // dense index
+  bool backfacing = false;
+};
+
+/// with_uv: also the active UV map (skipped where no program reads it).
+SurfacePoint surface_point(const Scene&, const Ray&, const Hit&, bool with_uv);
+
+/// A ray's start beyond self-intersection on the side that `direction` leaves to. The error bound covers the transform.
+Vec3 offset_origin(const SurfacePoint&, const Vec3& direction);
+
+}  // namespace afterglow

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A scene made ready to be rendered: the tables, and what rays, materials and lights built from them. One commit keeps
+// all of them in step. Methods and the renderer read it; only commit() writes it, and no reader may run meanwhile.
+#pragma once
+
+#include "lights/lights.h"
+#include "rays/ray_caster.h"
+#include "scene/changes.h"
+#include "scene/effects.h"
+#include "scene/scene.h"
+
+namespace afterglow {
+
+struct CommittedScene {
+  Scene scene;
+  RayCaster rays;
+  Materials materials;
+  Lights lights;
+  Effects effects;
+  double commit_seconds = 0.0;
+
+  /// Changes since the last commit, warnings of every layer included.
+  SceneChanges commit(RayCaster::Options options);
+};
+
+}  // namespace afterglow
