@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Procedural scenes. `SCENES` names every one, `BLEND_FILES` those that stand as files in `blend_files/`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from . import rooms
+from .description import Camera, Description, Light, Mesh, Node, Object, Picture, look_at, node, rotate, scale, translate
+
+SCENES: dict[str, Callable[..., Description]] = {
+    "cornell_box": rooms.cornell_box,
+    **{f"cornell_{v}": partial(rooms.cornell_box, v)
+       for v in ("glossy", "glass", "textured", "many_lights", "indirect", "statue", "emissive", "mirror")},
+    "furnace": rooms.furnace,
+    "world_furnace": rooms.world_furnace,
+    "sealed_box": rooms.sealed_box,
+    "thin_walls": rooms.thin_walls,
+    "veach_door": rooms.veach_door,
+    "many_lights": rooms.many_lights,
+    "textured_room": rooms.textured_room,
+    "desk_with_chair": rooms.desk_with_chair,
+}
+BLEND_FILES: dict[str, Callable[..., Description]] = {
+    name: SCENES[name]
+    for name in ("cornell_box", "cornell_glossy", "cornell_glass", "textured_room", "many_lights", "veach_door")
+}
+
+
+def make(name: str) -> Description:
+    """The scene of that name with its defaults; a KeyError names the ones there are."""
+    if name not in SCENES:
+        raise KeyError(f"no scene {name!r}; there are {', '.join(SCENES)}")
+    return SCENES[name]()
+
+
+__all__ = [
+    "BLEND_FILES", "SCENES", "Camera", "Description", "Light", "Mesh", "Node", "Object", "Picture", "look_at", "make", "node",
+    "rotate", "scale", "translate",
+]
