@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The viewport: a native session in the background, whose newest picture is drawn whenever Blender redraws the region.
+
+Blender's data are read in `view_update` and `view_draw` alone; a thread of ours only watches the session and asks for
+redraws. Nothing here waits for a picture: while the first one of a new state is not there, the last one stays.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+import weakref
+from typing import Any
+
+import bpy
+
+from . import backend, display
+from .final import NativeScene, mist_settings
+from .properties.scene import session_settings
+from .sync import sync_camera_view
+
+WATCH_SECONDS = 0.015  # how often the watcher looks for a newer picture
+REDRAW_SECONDS = 0.05  # between two redraws of a picture that refines slowly, at least
+
+
+class Watcher(threading.Thread):
+    """Asks Blender for a redraw whenever the session has a newer picture. Holds the engine weakly: Blender frees it when it
+    likes."""
+
+    def __init__(self, engine: bpy.types.RenderEngine) -> None:
+        super().__init__(name="Afterglow viewport", daemon=True)
+        self._engine = weakref.ref(engine)
+        self._stop = threading.Event()
+        self._wake = threading.Event()
+        self._session: Any = None
+        self._seen = -1
+
+    def watch(self, session: Any) -> None:
+        """Looks at this session from now on."""
+        self._session, self._seen = session, -1
+        self._wake.set()
+
+    def wake(self) -> None:
+        self._wake.set()
+
+    def stop(self) -> None:
+        self._stop.set()
+        self._wake.set()
+
+    def run(self) -> None:
+        last = 0.0
+        while not self._stop.is_set():
+            self._wake.wait()
+            self._wake.clear()
+            while not self._stop.is_set():
+                session = self._session
+                if session is None:
+                    break
+                progress = session.progress()
+                running = progress["state"] == "running"
+                now = time.perf_counter()
+                early = progress["samples"] <= 2
+                if progress["generation"] != self._seen and (not running or early or now - last >= REDRAW_SECONDS):
+                    self._seen, last = progress["generation"], now
+                    if not self._redraw():
+                        return
+                if not running:
+                    break
+                session = None
+                time.sleep(WATCH_SECONDS)
+
+    def _redraw(self) -> bool:
+        engine = self._engine()
+        if engine is None:
+            return False
+        try:
+            engine.tag_redraw()
+        except ReferenceError:  # Blender freed the engine in the meantime
+            return False
+        return True
+
+
+class Viewport:
+    """One 3D viewport in rendered mode."""
+
+    def __init__(self, engine: bpy.types.RenderEngine) -> None:
+        self.native: NativeScene | None = None
+        self.session: Any = None
+        self.picture: display.Picture | None = None
+        self.generation = -1
+        self.camera: Any = None
+        self.settings: dict[str, Any] = {}
+        self.failure = ""
+        self.watcher = Watcher(engine)
+        self.watcher.start()
+
+    def free(self) -> None:
+        """Stops everything; Blender calls nothing afterwards."""
+        self.watcher.stop()
+        session, self.session = self.session, None
+        if session is not None:
+            session.cancel()
+        self.native = self.picture = None
+
+    # Edits ---------------------------------------------------------------------------------------------------------------
+
+    def update(self, engine: bpy.types.RenderEngine, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Reads what changed in the scene."""
+        if backend.afterglow is None:
+            self.fail(engine, backend.problem)
+            return
+        try:
+            self._update(engine, context, depsgraph)
+            self.failure = ""
+        except Exception as error:
+            traceback.print_exc()
+            self.fail(engine, str(error))
+
+    def _update(self, engine: Any, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        if self.native is None:
+            self.native = NativeScene()
+        if self.session is None:
+            self.native.sync.sync(depsgraph, view=context.space_data)
+            self._set_view(engine, context, depsgraph)
+        else:
+            with self.session.edit():
+                self.native.sync.sync(depsgraph, view=context.space_data)
+                self.native.scene.commit()
+            self.watcher.wake()
+        for text in self.native.take_warnings():
+            print("Afterglow:", text)
+
+    def _set_view(self, engine: Any, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Starts the session or gives it the new view and settings, where these differ from the last ones."""
+        scene, region, space = depsgraph.scene, context.region, context.space_data
+        view = sync_camera_view(depsgraph, region, context.region_data, space, 1.0 / pixel_size(scene))
+        settings = session_settings(scene, viewport=True)
+        settings.update(width=view.width, height=view.height, region=view.region, passes=["combined"],
+                        mist=mist_settings(scene), local_view=self.native.sync.local_view(space))
+        key = (view.camera, view.width, view.height, view.region)
+        if self.session is None:
+            self.native.scene.set_camera(**view.camera)
+            self.native.scene.commit()
+            self.session = backend.afterglow.Session(self.native.scene, settings)
+            self.session.start()
+            self.watcher.watch(self.session)
+        else:
+            moved = not same_camera(key, self.camera)
+            if moved:
+                with self.session.edit():
+                    self.native.scene.set_camera(**view.camera)
+                    self.native.scene.commit()
+            if settings != self.settings:
+                self.session.update(settings)
+            if moved or settings != self.settings:
+                self.watcher.wake()
+        self.camera, self.settings, self.view = key, settings, view
+
+    # Drawing -------------------------------------------------------------------------------------------------------------
+
+    def draw(self, engine: bpy.types.RenderEngine, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Draws the newest picture; starts anew first where the view changed."""
+        if self.session is None:
+            return
+        try:
+            self._set_view(engine, context, depsgraph)
+            self._draw(engine, context)
+        except Exception as error:
+            traceback.print_exc()
+            self.fail(engine, str(error))
+
+    def _draw(self, engine: Any, context: bpy.types.Context) -> None:
+        progress = self.session.progress()
+        x0, y0, x1, y1 = self.view.region
+        width, height = x1 - x0, y1 - y0
+        if width <= 0 or height <= 0:
+            return
+        if progress["generation"] != self.generation:
+            if self.picture is None or (self.picture.width, self.picture.height) != (width, height):
+                self.picture = display.Picture(width, height)
+            self.session.read("combined", self.picture.pixels)
+            self.picture.upload()
+            self.generation = progress["generation"]
+        scale_x = context.region.width / self.view.width
+        scale_y = context.region.height / self.view.height
+        if self.picture is not None:
+            self.picture.draw(x0 * scale_x, y0 * scale_y, width * scale_x, height * scale_y)
+        engine.update_stats("Afterglow", view_status(self.settings, progress))
+
+    def fail(self, engine: Any, text: str) -> None:
+        """Tells what is wrong in the viewport's status; the last picture stays."""
+        if text != self.failure:
+            self.failure = text
+            engine.update_stats("Afterglow", text)
+
+
+def pixel_size(scene: bpy.types.Scene) -> int:
+    """Pixels of the region for one rendered pixel, by Blender's own setting of the viewport's resolution."""
+    setting = scene.render.preview_pixel_size
+    if setting == "AUTO":
+        return 2 if bpy.context.preferences.system.pixel_size > 1.5 else 1
+    return int(setting)
+
+
+def same_camera(one: Any, other: Any) -> bool:
+    """Whether two views are equal; their transforms are arrays."""
+    if one is None or other is None or one[1:] != other[1:] or one[0].keys() != other[0].keys():
+        return False
+    return all((a == b).all() if hasattr(a, "all") else a == b
+               for a, b in ((one[0][name], other[0][name]) for name in one[0]))
+
+
+def view_status(settings: dict[str, Any], progress: dict[str, Any]) -> str:
+    """The viewport's status line: method, samples, believed error, time."""
+    method = str(settings["method"]).replace("_", " ").title()
+    parts = [method, f"{progress['samples']} samples"]
+    if progress.get("error") is not None:
+        parts.append(f"error {progress['error']:.1%}")
+    parts.append(f"{progress['elapsed']:.1f} s")
+    if progress["state"] == "paused":
+        parts.append("paused")
+    return " | ".join(parts)
