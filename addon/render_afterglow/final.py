@@ -177,8 +177,9 @@ def run(
         engine.end_result(result, cancel=True)
         raise
     engine.update_progress(1.0)
-    stamp(result, session.statistics())
     engine.end_result(result)
+    if not engine.is_preview:
+        stamp(engine.get_result(), layer, session.statistics())
     return cancelled, images
 
 
@@ -215,8 +216,8 @@ def clock(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{int(rest):02d}" if hours else f"{minutes:02d}:{rest:05.2f}"
 
 
-def stamp(result: Any, statistics: dict[str, Any]) -> None:
-    """Writes what the render did into the image's metadata."""
+def stamp(result: Any, layer: str, statistics: dict[str, Any]) -> None:
+    """Writes what the render did into the image's metadata, as `afterglow.<layer>.<name>`; `result` is the whole frame's."""
     if not hasattr(result, "stamp_data_add_field"):
         return
     fields = {"method": statistics.get("method"), "samples": statistics.get("samples"), "threads": statistics.get("threads"),
@@ -234,24 +235,34 @@ def stamp(result: Any, statistics: dict[str, Any]) -> None:
     fields["bytes"] = memory
     for name, value in fields.items():
         if value is not None and value != "":
-            result.stamp_data_add_field(f"afterglow.{name}", str(value))
+            result.stamp_data_add_field(f"afterglow.{layer}.{name}", str(value))
 
 
 def restore_last_image(engine: bpy.types.RenderEngine, scene: bpy.types.Scene, layer: str) -> None:
-    """After a failure: the last good image of the same size comes back into the result. Not in an animation, whose files
-    must not hold another frame's picture."""
-    images = store.last_image(scene, layer)
-    if not images or engine.is_preview or engine.is_animation:
-        return
-    height, width = next(iter(images.values())).shape[:2]
-    for name, pixels in list(images.items())[1:]:
-        item = next((p for p in passes.PASSES if p.name == name), None)
-        if item is not None:
+    """After a failure: the last good image comes back into the result where it has the same size, else an empty one. There
+    must be one: Blender 3.4 to 5.0 crash when they write an OpenEXR file of a result without a picture. Never another
+    frame's picture in an animation, whose files must not lie."""
+    width, height = result_size(engine, scene)
+    images = store.last_image(scene, layer) or {}
+    if engine.is_preview or engine.is_animation or any(pixels.shape[:2] != (height, width) for pixels in images.values()):
+        images = {}
+    known = {item.name: item for item in passes.PASSES}
+    for name in images:
+        if name in known:
+            item = known[name]
             engine.add_pass(name, len(item.channels), item.channels, layer=layer)
     result = engine.begin_result(0, 0, width, height, layer=layer)
     by_name = {item.name: item for item in result.layers[0].passes}
     for name, pixels in images.items():
-        target = by_name.get(name)
-        if target is not None and len(target.rect) == width * height:
-            display.write_pass(target, pixels)
+        if name in by_name:
+            display.write_pass(by_name[name], pixels)
     engine.end_result(result)
+
+
+def result_size(engine: bpy.types.RenderEngine, scene: bpy.types.Scene) -> tuple[int, int]:
+    """Width and height of the rectangle that Blender wants, by the same arithmetic."""
+    width, height, render = engine.resolution_x, engine.resolution_y, scene.render
+    if render.use_border and not engine.is_preview:
+        return (max(1, int(render.border_max_x * width) - int(render.border_min_x * width)),
+                max(1, int(render.border_max_y * height) - int(render.border_min_y * height)))
+    return width, height
