@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from . import rooms
+from . import halls, moving, outdoors, rooms
 from .description import Camera, Description, Light, Mesh, Node, Object, Picture, look_at, node, rotate, scale, translate
 
 SCENES: dict[str, Callable[..., Description]] = {
@@ -21,10 +21,24 @@ SCENES: dict[str, Callable[..., Description]] = {
     "many_lights": rooms.many_lights,
     "textured_room": rooms.textured_room,
     "desk_with_chair": rooms.desk_with_chair,
+    "sun_and_sky": outdoors.sun_and_sky,
+    "transparency": outdoors.transparency,
+    "area_lights": outdoors.area_lights,
+    "materials": outdoors.materials,
+    "pillared_hall": halls.pillared_hall,
+    "office_with_blinds": halls.office_with_blinds,
+    "conference_room": halls.conference_room,
+    "bouncing_bunnies": moving.bouncing_bunnies,
+    "wobbling_cylinder": moving.wobbling_cylinder,
+    "kite": moving.kite,
+    "spheres": moving.bouncing_spheres,
 }
 BLEND_FILES: dict[str, Callable[..., Description]] = {
     name: SCENES[name]
-    for name in ("cornell_box", "cornell_glossy", "cornell_glass", "textured_room", "many_lights", "veach_door")
+    for name in (
+        "cornell_box", "cornell_glossy", "cornell_glass", "textured_room", "many_lights", "veach_door", "sun_and_sky",
+        "transparency", "area_lights", "materials", "spheres",
+    )
 }
 
 
