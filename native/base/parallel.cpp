@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Parallel loops over TBB: see parallel.h.
+#include "base/parallel.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
+
+namespace afterglow {
+
+#if defined(__SSE2__)
+FlushDenormals::FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040u); }  // flush and read as zero
+FlushDenormals::~FlushDenormals() { _mm_setcsr(saved_); }
+#else
+FlushDenormals::FlushDenormals() : saved_(0) {}
+FlushDenormals::~FlushDenormals() {}
+#endif
+
+unsigned thread_count(unsigned threads) {
+  const unsigned all = unsigned(tbb::this_task_arena::max_concurrency());
+  return threads ? threads : std::max(1u, all);
+}
+
+void run_limited(unsigned threads, const std::function<void()>& work) {
+  if (threads == 0) return work();
+  tbb::task_arena arena(static_cast<int>(threads));
+  arena.execute(work);
+}
+
+void parallel_blocks(size_t count, size_t block, unsigned threads, const std::function<void(size_t, size_t)>& body,
+                     StopToken stop) {
+  block = std::max<size_t>(block, 1);
+  const size_t blocks = (count + block - 1) / block;
+  const auto run = [&](size_t b) {
+    if (stop.stop()) return;
+    const FlushDenormals flush;
+    body(b * block, std::min(count, (b + 1) * block));
+  };
+  if (threads == 1 || blocks <= 1) {
+    for (size_t b = 0; b < blocks; ++b) run(b);
+    return;
+  }
+  run_limited(threads, [&] {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, blocks, 1), [&](const tbb::blocked_range<size_t>& range) {
+      for (size_t b = range.begin(); b != range.end(); ++b) run(b);
+    }, tbb::simple_partitioner());
+  });
+}
+
+}  // namespace afterglow
