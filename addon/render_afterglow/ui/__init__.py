@@ -3,20 +3,22 @@
 
 import bpy
 
-from . import camera, light, material, object, render, standard, view_layer, world
+from . import camera, light, material, object, render, standard, view3d, view_layer, world
 
-_modules = (render, view_layer, camera, object, light, material, world)
+_modules = (render, view_layer, camera, object, light, material, world, view3d)
 
 
 def register() -> None:
     for module in _modules:
         for panel in module.classes:
             bpy.utils.register_class(panel)
+    bpy.types.VIEW3D_HT_header.append(view3d.draw_pause)
     standard.register()
 
 
 def unregister() -> None:
     standard.unregister()
+    bpy.types.VIEW3D_HT_header.remove(view3d.draw_pause)
     for module in reversed(_modules):
         for panel in reversed(module.classes):
             bpy.utils.unregister_class(panel)
