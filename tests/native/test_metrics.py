@@ -59,13 +59,13 @@ def test_halves_are_free_of_the_references_noise() -> None:
     rng = np.random.default_rng(1)
     truth = rng.uniform(0.2, 1.0, (128, 128, 3))
     image = truth * (1 + 0.03 * rng.standard_normal(truth.shape))
-    parts = [truth * (1 + 0.3 * rng.standard_normal(truth.shape)) for _ in range(6)]
+    parts = [truth * (1 + 0.1 * rng.standard_normal(truth.shape)) for _ in range(6)]
     exact = metrics.relmse(image, truth)
     for chosen in (parts[:2], parts):
         value, error = metrics.halves_relmse(image, chosen)
-        assert 0 < error < 0.3 * metrics.relmse(image, np.mean(chosen, 0))
+        assert 0 < error < 0.1 * exact
         assert abs(value - exact) < 4 * error
-    assert metrics.relmse(image, np.mean(parts, 0)) > 3 * exact
+    assert metrics.relmse(image, np.mean(parts, 0)) > 2 * exact
 
 
 def test_the_error_bar_of_halves_is_honest() -> None:
@@ -75,9 +75,9 @@ def test_the_error_bar_of_halves_is_honest() -> None:
     image = truth * 1.05
     exact, pulls = metrics.relmse(image, truth), []
     for _ in range(150):
-        value, error = metrics.halves_relmse(image, [truth * (1 + 0.2 * rng.standard_normal(truth.shape)) for _ in range(8)])
+        value, error = metrics.halves_relmse(image, [truth * (1 + 0.1 * rng.standard_normal(truth.shape)) for _ in range(8)])
         pulls.append((value - exact) / error)
-    assert 0.85 < np.std(pulls) < 1.5
+    assert 0.8 < np.std(pulls) < 1.4
     assert abs(np.mean(pulls)) < 0.5
 
 

@@ -71,30 +71,32 @@ def mean_ratio(image: Any, reference: Any) -> float:
 
 
 def halves_relmse(image: Any, parts: Sequence[Any]) -> Estimate:
-    """relMSE against the mean of two or more independent parts of a reference, unbiased; its error bar (one standard error).
+    """relMSE against the mean of two or more independent parts of a reference, free of its noise; with its standard error.
 
-    The error is a jackknife over the parts where there are three or more, else it comes from 16 × 16 blocks of pixels.
-    An estimate of a small error may be negative: it is not cut.
+    Each pair's product is weighted by the other parts' mean where there are four or more: were the pair in its own weight,
+    its noise would come back through it. The error is that of a U-statistic over the parts, with two or three parts from
+    16 × 16 blocks of pixels. An estimate of a small error may be negative: it is not cut.
     """
     stack = np.stack([rgb(part) for part in parts])
-    if len(stack) < 2:
+    count = len(stack)
+    if count < 2:
         raise ValueError("an unbiased estimate takes two independent parts of a reference or more")
-    mean = stack.mean(0)
-    scale = exposure(mean)
-    difference = (rgb(image) - stack) * scale
-    weight = 1.0 / ((mean * scale) ** 2 + FLOOR)
-
-    def estimate(total: Array, squares: Array, count: int) -> Array:
-        """All pairs i ≠ j at once: ((Σd)² − Σd²) / (n (n − 1))."""
-        return (total**2 - squares) / (count * (count - 1)) * weight
-
-    total, squares, count = difference.sum(0), (difference**2).sum(0), len(stack)
-    pixels = estimate(total, squares, count)
-    if count >= 3:
-        left_out = [float(estimate(total - d, squares - d * d, count - 1).mean()) for d in difference]
-        spread = (count - 1) / count * float(np.sum((np.array(left_out) - np.mean(left_out)) ** 2))
-        return Estimate(float(pixels.mean()), spread**0.5)
-    return Estimate(float(pixels.mean()), block_error(pixels))
+    total = stack.sum(0)
+    scale = exposure(total / count)
+    difference, stack, total = (rgb(image) - stack) * scale, stack * scale, total * scale
+    pairs = np.zeros((count, count))
+    pixels = np.zeros(total.shape)
+    for i in range(count):
+        for j in range(i):
+            weight = (total - stack[i] - stack[j]) / (count - 2) if count >= 4 else total / count
+            product = difference[i] * difference[j] / (weight**2 + FLOOR)
+            pairs[i, j] = pairs[j, i] = product.mean()
+            pixels += product
+    value = float(pairs.sum() / (count * (count - 1)))
+    if count < 4:
+        return Estimate(value, block_error(pixels * 2 / (count * (count - 1))))
+    by_part = pairs.sum(1) / (count - 1)
+    return Estimate(value, float(2 * by_part.std(ddof=1) / count**0.5))
 
 
 def block_error(pixels: Array, size: int = 16) -> float:
