@@ -13,8 +13,8 @@ namespace afterglow {
 
 namespace {
 
-constexpr uint32_t kMostRefits = 64;     // then the BVH is built anew
-constexpr float kMostGrowth = 2.0f;      // of the bounds' surface since the last build
+constexpr uint32_t kMostRefits = 64;                          // then the BVH is built anew
+constexpr float kMostGrowth = 2.0f;                           // of the bounds' surface since the last build
 constexpr RTCSceneFlags kSceneFlags = RTC_SCENE_FLAG_ROBUST;  // watertight: thin walls must not leak
 
 float half_area(const Box& box) {
@@ -112,7 +112,8 @@ std::vector<bool> RayCaster::State::choose_flat(const Scene& scene, const Option
   return flat;
 }
 
-void RayCaster::State::build_meshes(const Scene& scene, const std::set<Handle>& rebuild, const std::set<Handle>& refit) {
+void RayCaster::State::build_meshes(const Scene& scene, const std::set<Handle>& rebuild,
+                                    const std::set<Handle>& refit) {
   struct Job {
     const Mesh* mesh;
     MeshBvh* bvh;
@@ -135,7 +136,8 @@ void RayCaster::State::build_meshes(const Scene& scene, const std::set<Handle>& 
         bvh->scene = rtcNewScene(device);
         rtcSetSceneFlags(bvh->scene, kSceneFlags);
       }
-      const bool loose = again && (bvh->refits >= kMostRefits || half_area(mesh->bounds) > kMostGrowth * bvh->first_area);
+      const bool loose =
+          again && (bvh->refits >= kMostRefits || half_area(mesh->bounds) > kMostGrowth * bvh->first_area);
       if (again && bvh->refitting && !loose) {
         rtcUpdateGeometryBuffer(bvh->geometry, RTC_BUFFER_TYPE_VERTEX, 0);
         ++bvh->refits;
@@ -169,8 +171,8 @@ RTCGeometry RayCaster::State::flat_geometry(const Mesh& mesh, const Affine& to_w
     share_positions(geometry, mesh);
     return geometry;
   }
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                               12, mesh.positions.size()));
+  auto* vertices = static_cast<float*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
   if (!vertices) return geometry;  // the error function knows
   for (size_t v = 0; v < mesh.positions.size(); ++v) {
     const Vec3 p = to_world.point(mesh.positions[v]);

@@ -17,8 +17,8 @@ namespace afterglow {
 struct MeshBvh {
   RTCScene scene = nullptr;
   RTCGeometry geometry = nullptr;
-  uint32_t refits = 0;     // since the last build from nothing
-  bool refitting = false;  // built so that it can be refitted
+  uint32_t refits = 0;      // since the last build from nothing
+  bool refitting = false;   // built so that it can be refitted
   float first_area = 0.0f;  // half surface of the bounds when it was built
   ~MeshBvh();
 };

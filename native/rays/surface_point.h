@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The geometric facts at a hit, and where the next ray may start. Positions come from barycentric coordinates, not from
-// the ray, so that they lie on the triangle; a bound of their rounding error goes along (after Woo et al. 1996 and Pharr
-// et al. 2023, 6.8), because a fixed offset would fit only one size of scene.
+// the ray, so that they lie on the triangle; a bound of their rounding error goes along (after Woo et al. 1996 and
+// Pharr et al. 2023, 6.8), because a fixed offset would fit only one size of scene.
 #pragma once
 
 #include "rays/ray_caster.h"
