@@ -13,7 +13,11 @@ afterglow: Any = None
 problem = ""
 
 try:
-    from .library import afterglow  # type: ignore[no-redef]
+    from .library import afterglow as _package
+
+    if not hasattr(_package, "Session"):
+        raise ImportError(f"the package at {_package.__file__} has no native module")
+    afterglow = _package
 except Exception as error:  # Whatever stops the native module from loading is told to the user, not to the console alone.
     problem = f"The native module of Afterglow could not be loaded: {error}"
     print("Afterglow:", problem)

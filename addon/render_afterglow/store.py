@@ -71,7 +71,7 @@ def last_image(scene: bpy.types.Scene, layer: str) -> dict[str, np.ndarray] | No
 def clear() -> None:
     _kept.clear()
     _statistics.clear()
-    forget_records = getattr(backend.afterglow, "clear_statistics", None)
+    forget_records = getattr(backend.afterglow, "forget_statistics", None)
     if forget_records is not None:
         forget_records()
     _last_good.clear()
