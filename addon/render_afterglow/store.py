@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What outlives a RenderEngine object, keyed by scene: Blender makes a new engine object for every frame and mode switch.
+"""What outlives a RenderEngine object, keyed by scene: Blender makes a new engine object for every frame and mode
+switch.
 
 Native scenes of final renders stay here between the frames of an animation when "Persistent Data" is on; statistics and
 the last good image of each layer stay until another file is opened.

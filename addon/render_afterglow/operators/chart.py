@@ -7,6 +7,7 @@ window, and are left out in the background.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -16,7 +17,14 @@ import numpy as np
 WIDTH, HEIGHT = 960, 640
 LEFT, RIGHT, BOTTOM, TOP = 90, 30, 70, 60
 BACKGROUND, GRID, INK = (0.12, 0.12, 0.13), (0.22, 0.22, 0.24), (0.85, 0.85, 0.85)
-COLOURS = ((0.98, 0.72, 0.25), (0.35, 0.70, 0.98), (0.45, 0.85, 0.50), (0.95, 0.45, 0.45), (0.75, 0.55, 0.95), (0.5, 0.9, 0.9))
+COLOURS = (
+    (0.98, 0.72, 0.25),
+    (0.35, 0.70, 0.98),
+    (0.45, 0.85, 0.50),
+    (0.95, 0.45, 0.45),
+    (0.75, 0.55, 0.95),
+    (0.5, 0.9, 0.9),
+)
 
 
 @dataclass
@@ -59,7 +67,9 @@ class Canvas:
         coverage = np.clip(coverage, 0.0, 1.0)[..., None]
         self.pixels[..., :3] += coverage * (np.array(colour, np.float32) - self.pixels[..., :3])
 
-    def line(self, x0: float, y0: float, x1: float, y1: float, colour: tuple[float, float, float], width: float = 1.0) -> None:
+    def line(
+        self, x0: float, y0: float, x1: float, y1: float, colour: tuple[float, float, float], width: float = 1.0
+    ) -> None:
         dx, dy = x1 - x0, y1 - y0
         along = ((self.columns - x0) * dx + (self.rows - y0) * dy) / max(dx * dx + dy * dy, 1e-9)
         along = np.clip(along, 0.0, 1.0)
@@ -88,9 +98,10 @@ class Canvas:
             with gpu.matrix.push_pop():
                 gpu.matrix.load_matrix(Matrix.Identity(4))
                 gpu.matrix.load_projection_matrix(
-                    Matrix(((2 / WIDTH, 0, 0, -1), (0, 2 / HEIGHT, 0, -1), (0, 0, 1, 0), (0, 0, 0, 1))))
+                    Matrix(((2 / WIDTH, 0, 0, -1), (0, 2 / HEIGHT, 0, -1), (0, 0, 1, 0), (0, 0, 0, 1)))
+                )
                 gpu.state.blend_set("ALPHA")
-                for x, y, words, size, colour in self.texts:
+                for x, y, words, size, _colour in self.texts:
                     blf.size(0, size, *((72,) if bpy.app.version < (4, 0, 0) else ()))
                     width = blf.dimensions(0, words)[0]
                     blf.color(0, 1.0, 1.0, 1.0, 1.0)
@@ -118,11 +129,11 @@ def draw(chart: Chart) -> np.ndarray:
     for power in range(x_low, x_high + 1):
         x, y = place(10.0**power, 10.0**y_low)
         canvas.line(x, BOTTOM, x, HEIGHT - TOP, GRID)
-        canvas.text(x, BOTTOM - 22, f"{10.0 ** power:g} s")
+        canvas.text(x, BOTTOM - 22, f"{10.0**power:g} s")
     for power in range(y_low, y_high + 1):
         x, y = place(10.0**x_low, 10.0**power)
         canvas.line(LEFT, y, WIDTH - RIGHT, y, GRID)
-        canvas.text(LEFT - 42, y - 5, f"{10.0 ** power:g}")
+        canvas.text(LEFT - 42, y - 5, f"{10.0**power:g}")
     canvas.text(WIDTH / 2, HEIGHT - 32, chart.title, 18)
     canvas.text(WIDTH / 2, 16, "wall time of the whole frame")
     canvas.text(LEFT - 20, HEIGHT - TOP + 12, "error (relMSE)")
@@ -130,18 +141,22 @@ def draw(chart: Chart) -> np.ndarray:
         colour = COLOURS[number % len(COLOURS)]
         line = sorted((p for p in line if p.error > 0 and p.seconds > 0), key=lambda p: p.seconds)
         places = [place(p.seconds, p.error) for p in line]
-        for (x0, y0), (x1, y1) in zip(places, places[1:]):
+        for (x0, y0), (x1, y1) in itertools.pairwise(places):
             canvas.line(x0, y0, x1, y1, colour, 2.0)
-        for point, (x, y) in zip(line, places):
-            low, high = place(point.seconds, max(point.error - point.error_bar, 1e-12))[1], \
-                place(point.seconds, point.error + point.error_bar)[1]
+        for point, (x, y) in zip(line, places, strict=True):
+            low, high = (
+                place(point.seconds, max(point.error - point.error_bar, 1e-12))[1],
+                place(point.seconds, point.error + point.error_bar)[1],
+            )
             canvas.line(x, low, x, high, colour)
             canvas.disk(x, y, 4.0, colour)
             if point.used:
                 canvas.disk(x, y, 10.0, INK, ring=2.0)
             if point.label:
                 canvas.text(x, y + 12, point.label, 11)
-        canvas.line(WIDTH - 210, HEIGHT - TOP - 16 - 22 * number, WIDTH - 180, HEIGHT - TOP - 16 - 22 * number, colour, 3.0)
+        canvas.line(
+            WIDTH - 210, HEIGHT - TOP - 16 - 22 * number, WIDTH - 180, HEIGHT - TOP - 16 - 22 * number, colour, 3.0
+        )
         canvas.text(WIDTH - 110, HEIGHT - TOP - 21 - 22 * number, name)
     canvas.write_texts()
     return canvas.pixels

@@ -16,7 +16,9 @@ def processor() -> str:
     """The processor's name where the system tells it."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
-            return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+            return next(
+                (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine()
+            )
     except OSError:
         return platform.processor() or platform.machine()
 
@@ -38,7 +40,10 @@ def information(scene: bpy.types.Scene) -> dict[str, Any]:
 class AFTERGLOW_OT_copy_information(bpy.types.Operator):
     bl_idname = "afterglow.copy_information"
     bl_label = "Copy Information"
-    bl_description = "Copy machine, versions, settings and the last render's statistics to the clipboard, for a report or to compare machines"
+    bl_description = (
+        "Copy machine, versions, settings and the last render's statistics to the clipboard, for a report "
+        "or to compare machines"
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.window_manager.clipboard = json.dumps(information(context.scene), indent=1, default=str)

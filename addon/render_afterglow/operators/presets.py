@@ -9,7 +9,9 @@ QUALITIES = {
     "DRAFT": dict(accuracy=0.2, samples=64, preview_accuracy=0.1),
     "MEDIUM": dict(accuracy=0.05, samples=1024, preview_accuracy=0.02),
     "HIGH": dict(accuracy=0.02, samples=8192, preview_accuracy=0.02),
-    "REFERENCE": dict(accuracy=0.005, samples=1 << 20, preview_accuracy=0.01, sample_clamp_direct=0.0, sample_clamp_indirect=0.0),
+    "REFERENCE": dict(
+        accuracy=0.005, samples=1 << 20, preview_accuracy=0.01, sample_clamp_direct=0.0, sample_clamp_indirect=0.0
+    ),
 }
 QUALITY_ITEMS = [
     ("DRAFT", "Draft", "Relative error of 20 %, 64 samples at most", 0),
@@ -19,9 +21,24 @@ QUALITY_ITEMS = [
 ]
 # Settings that Cycles has by the same name and in the same meaning.
 FROM_CYCLES = (
-    "samples", "seed", "use_animated_seed", "max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces",
-    "transparent_max_bounces", "sample_clamp_direct", "sample_clamp_indirect", "caustics_reflective", "caustics_refractive",
-    "film_exposure", "pixel_filter_type", "filter_width", "preview_samples", "use_preview_denoising", "time_limit",
+    "samples",
+    "seed",
+    "use_animated_seed",
+    "max_bounces",
+    "diffuse_bounces",
+    "glossy_bounces",
+    "transmission_bounces",
+    "transparent_max_bounces",
+    "sample_clamp_direct",
+    "sample_clamp_indirect",
+    "caustics_reflective",
+    "caustics_refractive",
+    "film_exposure",
+    "pixel_filter_type",
+    "filter_width",
+    "preview_samples",
+    "use_preview_denoising",
+    "time_limit",
 )
 
 
@@ -74,10 +91,26 @@ class AFTERGLOW_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):
     preset_defines = ["settings = bpy.context.scene.afterglow"]
     preset_values = [
         "settings." + name
-        for name in ("method", "accuracy", "samples", "time_limit", "seed", "max_bounces", "diffuse_bounces", "glossy_bounces",
-                     "transmission_bounces", "transparent_max_bounces", "sample_clamp_direct", "sample_clamp_indirect",
-                     "caustics_reflective", "caustics_refractive", "denoise", "preview_accuracy", "preview_samples",
-                     "use_preview_denoising")
+        for name in (
+            "method",
+            "accuracy",
+            "samples",
+            "time_limit",
+            "seed",
+            "max_bounces",
+            "diffuse_bounces",
+            "glossy_bounces",
+            "transmission_bounces",
+            "transparent_max_bounces",
+            "sample_clamp_direct",
+            "sample_clamp_indirect",
+            "caustics_reflective",
+            "caustics_refractive",
+            "denoise",
+            "preview_accuracy",
+            "preview_samples",
+            "use_preview_denoising",
+        )
     ]
 
 

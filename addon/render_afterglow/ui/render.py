@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panels of the render tab: method and accuracy, light paths, film, performance, denoising, what the last render did."""
+"""Panels of the render tab: method and accuracy, light paths, film, performance, denoising, what the last render
+did."""
 
 import bpy
 from bl_ui.utils import PresetPanel
@@ -198,12 +199,16 @@ class AFTERGLOW_RENDER_PT_statistics(PropertiesPanel, bpy.types.Panel):
 
 def statistics_lines(statistics: dict) -> list[tuple[str, str]]:
     """What a render did, as rows of a name and a value."""
-    lines = [("Method", str(statistics.get("method", "")).replace("_", " ").title()),
-             ("Samples", str(statistics.get("samples", "")))]
+    lines = [
+        ("Method", str(statistics.get("method", "")).replace("_", " ").title()),
+        ("Samples", str(statistics.get("samples", ""))),
+    ]
     error = statistics.get("believed_error")
     if error is not None:
         low, high = statistics.get("error_low"), statistics.get("error_high")
-        lines.append(("Error", f"{error:.2%}" + (f" ({low:.2%} to {high:.2%})" if low is not None and high is not None else "")))
+        lines.append(
+            ("Error", f"{error:.2%}" + (f" ({low:.2%} to {high:.2%})" if low is not None and high is not None else ""))
+        )
     lines.append(("Time", f"{statistics.get('wall_time', 0.0):.2f} s"))
     for stage, seconds in (statistics.get("seconds") or {}).items():
         lines.append(("  " + stage.replace("_", " ").title(), f"{seconds:.3f} s"))
@@ -222,8 +227,17 @@ def statistics_lines(statistics: dict) -> list[tuple[str, str]]:
 
 
 classes = (
-    AFTERGLOW_PT_sampling_presets, AFTERGLOW_RENDER_PT_sampling, AFTERGLOW_RENDER_PT_sampling_method, AFTERGLOW_RENDER_PT_sampling_render,
-    AFTERGLOW_RENDER_PT_sampling_viewport, AFTERGLOW_RENDER_PT_denoise, AFTERGLOW_RENDER_PT_light_paths,
-    AFTERGLOW_RENDER_PT_bounces, AFTERGLOW_RENDER_PT_clamping, AFTERGLOW_RENDER_PT_caustics, AFTERGLOW_RENDER_PT_film,
-    AFTERGLOW_RENDER_PT_performance, AFTERGLOW_RENDER_PT_statistics,
+    AFTERGLOW_PT_sampling_presets,
+    AFTERGLOW_RENDER_PT_sampling,
+    AFTERGLOW_RENDER_PT_sampling_method,
+    AFTERGLOW_RENDER_PT_sampling_render,
+    AFTERGLOW_RENDER_PT_sampling_viewport,
+    AFTERGLOW_RENDER_PT_denoise,
+    AFTERGLOW_RENDER_PT_light_paths,
+    AFTERGLOW_RENDER_PT_bounces,
+    AFTERGLOW_RENDER_PT_clamping,
+    AFTERGLOW_RENDER_PT_caustics,
+    AFTERGLOW_RENDER_PT_film,
+    AFTERGLOW_RENDER_PT_performance,
+    AFTERGLOW_RENDER_PT_statistics,
 )
