@@ -1,0 +1,364 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes, instances and lights of one native scene, from one walk over the depsgraph's object instances.
+
+Instances that share parent, object and mesh are one group: per instance only its matrix and its random number are read. A
+mesh that several objects share (none of them modifies it) is at one address in evaluated data and is read once.
+"""
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .lights import is_portal, read_light
+from .materials import MaterialTable, digest
+from .meshes import fingerprint, read_mesh
+from .visibility import object_visibility
+
+# what else is no mesh is shown by nothing (cameras, empties) or comes a second time as a mesh (curves, text, surfaces)
+LEFT_OUT = {"VOLUME": "volumes", "CURVES": "hair curves", "POINTCLOUD": "point clouds", "GPENCIL": "grease pencil",
+            "GREASEPENCIL": "grease pencil"}
+GroupKey = tuple[int, int, int]  # addresses of the original object and of the original parent (0: none), number among those
+
+
+@dataclass
+class MeshUse:
+    """A mesh as one walk meets it; read after the walk, when it is known what all of its users' materials ask for."""
+    data: Any
+    key: GroupKey               # of the first group that shows it
+    name: str                   # of that group's object
+    original_data: int          # address
+    maker: Any = None           # the object to ask by `to_mesh`, where the data are not a mesh to be read as it is
+    wanted: set[str] = field(default_factory=set)
+
+
+@dataclass
+class MeshEntry:
+    handle: int | None          # None: nothing to see
+    key: GroupKey               # of the first group that showed it
+    address: int
+    fingerprint: tuple[int, ...]
+    names: frozenset[str]       # attributes that it has and that were asked for
+    topology: int | None = None
+
+
+@dataclass
+class Group:
+    owner: int                  # address of the original object that Blender shows or hides
+    address: int                # of the evaluated mesh
+    properties: dict[str, Any]
+    materials: tuple[int, ...]  # keys of the material table
+    handles: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
+    transforms: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4, 4)))
+    randoms: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
+    mesh_handle: int | None = None
+    shown: dict[str, Any] | None = None    # properties that the native scene has
+
+
+@dataclass
+class LightEntry:
+    handle: int
+    kind: str
+    key: bytes
+    images: set[int]
+
+
+class Walk:
+    """What one walk has gathered for a group."""
+
+    def __init__(self, key: GroupKey, group: Group | None) -> None:
+        self.key, self.group = key, group
+        self.matrices: list[Any] = []
+        self.randoms: list[int] = []
+
+
+def stack_matrices(matrices: list[Any]) -> NDArray[np.float64]:
+    """(N, 4, 4) of mathutils matrices: by the buffer protocol where they have it, else row by row."""
+    if not matrices:
+        return np.empty((0, 4, 4))
+    try:
+        joined = np.frombuffer(b"".join(matrices), np.float32).reshape(-1, 4, 4)
+        return joined.transpose(0, 2, 1).astype(np.float64) if COLUMNS_FIRST else joined.astype(np.float64)
+    except TypeError:
+        flat = chain.from_iterable(chain.from_iterable(matrices))
+        return np.fromiter(flat, np.float64, len(matrices) * 16).reshape(-1, 4, 4)
+
+
+def _columns_first() -> bool:
+    from mathutils import Matrix
+    try:
+        return np.frombuffer(b"".join([Matrix.Translation((1, 2, 3))]), np.float32)[3] == 0.0
+    except TypeError:
+        return False
+
+
+COLUMNS_FIRST = _columns_first()
+
+
+class ObjectTable:
+    def __init__(self, scene: Any, materials: MaterialTable, warn: Callable[[str], None]) -> None:
+        self.scene, self.materials, self.warn = scene, materials, warn
+        self.meshes: dict[GroupKey, MeshEntry] = {}
+        self.groups: dict[GroupKey, Group] = {}
+        self.lights: dict[GroupKey, LightEntry] = {}
+
+    def used_materials(self) -> set[int]:
+        return set(chain.from_iterable(group.materials for group in self.groups.values()))
+
+    def used_images(self) -> set[int]:
+        return set(chain.from_iterable(light.images for light in self.lights.values()))
+
+    # -- the walk
+
+    def update(self, depsgraph: Any, layer: Any, updates: Any, report: Any, lights: bool) -> None:
+        self.layer, self.updates, self.report = layer, updates, report
+        self.counts: dict[tuple[int, int], int] = {}
+        self.uses: dict[int, MeshUse] = {}
+        self.next_lights: set[GroupKey] = set()
+        self.override = getattr(layer, "material_override", None)
+        walks: dict[tuple[int, int, int], Walk] = {}
+        for instance in depsgraph.object_instances:
+            if not instance.show_self:
+                continue
+            ob = instance.object
+            data = ob.data
+            if data is None:
+                continue
+            parent = instance.parent.original.as_pointer() if instance.is_instance else 0
+            key = (ob.original.as_pointer(), parent, data.as_pointer())
+            walk = walks.get(key)
+            if walk is None:
+                walk = self._begin(instance, ob, data, key, lights)
+                if walk is not LIGHT:
+                    walks[key] = walk
+            if walk.group is not None:
+                walk.matrices.append(instance.matrix_world.copy())
+                walk.randoms.append(instance.random_id)
+        self._finish([walk for walk in walks.values() if walk.group is not None])
+
+    def _begin(self, instance: Any, ob: Any, data: Any, addresses: tuple[int, int, int], lights: bool) -> Walk:
+        """First sight of a group: its mesh and what all of its instances share."""
+        kind = ob.type
+        if kind == "LIGHT":
+            if lights:
+                self._light(instance, ob, data, self._number(addresses))
+            return LIGHT
+        if kind in {"MESH", "META"}:
+            key = self._number(addresses)
+            use = self.uses.get(addresses[2])
+            if use is None:
+                temporary = kind == "META" or getattr(data, "is_editmode", False)
+                maker = (instance.instance_object if instance.is_instance else ob) if temporary else None
+                # an instance's object is gone after this step of the walk: nothing but its data may be kept
+                original = ob.original.data
+                use = self.uses[addresses[2]] = MeshUse(data, key, ob.name, original.as_pointer() if original else 0, maker)
+            return Walk(key, self._group(instance, ob, data, key, use))
+        if kind in LEFT_OUT:
+            self.warn(f"Object '{ob.name}': {LEFT_OUT[kind]} are not supported yet: left out")
+        return NOTHING
+
+    def _number(self, addresses: tuple[int, int, int]) -> GroupKey:
+        """Stable where addresses are not: objects and parents, and which of their meshes or lights it is."""
+        pair = addresses[:2]
+        number = self.counts.get(pair, 0)
+        self.counts[pair] = number + 1
+        return (*pair, number)
+
+    def _slots(self, ob: Any, data: Any) -> list[Any]:
+        """A material or None for each slot, linked to the object or to the data."""
+        if self.override is not None:
+            return [self.override]
+        slots = list(getattr(data, "materials", ()))
+        if ob.data == data:
+            for i, slot in enumerate(ob.material_slots):
+                if slot.link == "OBJECT":
+                    slots[i:i + 1] = [slot.material]
+        return slots or [None]
+
+    def _group(self, instance: Any, ob: Any, data: Any, key: GroupKey, use: MeshUse) -> Group:
+        old = self.groups.get(key)
+        if old is not None and self.updates.only_moved and not self.updates.everything:
+            group = old
+            group.address = data.as_pointer()
+        else:
+            pairs = [self.materials.handle(material, ob.name) for material in self._slots(ob, data)]
+            parent = instance.parent if instance.is_instance else None
+            bits, holdout, catcher = object_visibility(ob, parent, self.layer)
+            properties = {"name": ob.name, "materials": tuple(handle for _, handle in pairs), "object_index": ob.pass_index,
+                          "visibility": bits, "holdout": holdout, "shadow_catcher": catcher, "color": tuple(ob.color)}
+            group = Group(key[1] or key[0], data.as_pointer(), properties, tuple(address for address, _ in pairs))
+            if old is not None:
+                group.handles, group.transforms, group.randoms = old.handles, old.transforms, old.randoms
+                group.mesh_handle, group.shown = old.mesh_handle, old.shown
+        for address in group.materials:
+            use.wanted |= self.materials.table[address].attributes
+        return group
+
+    def _finish(self, walks: list[Walk]) -> None:
+        groups = {walk.key: walk.group for walk in walks}
+        for key, group in self.groups.items():
+            if key not in groups:
+                self._remove_group(group)
+        meshes = self._update_meshes()
+        for walk in walks:
+            try:
+                self._store_group(walk, meshes[walk.group.address].handle)
+            except Exception as error:  # noqa: BLE001  the render goes on without the object
+                self.warn(f"Object '{walk.group.properties['name']}': cannot be shown ({error}): left out")
+        self.groups = groups
+        kept = {entry.handle for entry in meshes.values()}
+        for entry in self.meshes.values():
+            if entry.handle is not None and entry.handle not in kept:
+                self.scene.remove_mesh(entry.handle)
+                self.report.removed += 1
+        self.meshes = {entry.key: entry for entry in meshes.values()}
+        for key in [key for key in self.lights if key not in self.next_lights]:
+            self.scene.remove_light(self.lights.pop(key).handle)
+            self.report.removed += 1
+
+    # -- meshes
+
+    def _update_meshes(self) -> dict[int, MeshEntry]:
+        """The mesh at each address that the walk has met: as it was, read anew, or new."""
+        by_address = {entry.address: entry for entry in self.meshes.values()}
+        result: dict[int, MeshEntry] = {}
+        claimed = {id(by_address[address]) for address in self.uses if address in by_address}
+        for address, use in self.uses.items():
+            known = by_address.get(address)
+            names = self._names(use)
+            if known is not None and self._is_clean(known, use, names):
+                known.key = use.key
+                result[address] = known
+                continue
+            if known is None:
+                known = self.meshes.get(use.key)
+                if known is not None and (id(known) in claimed or (known.handle is None)):
+                    known = None
+            if known is not None:
+                claimed.add(id(known))
+            result[address] = self._read_mesh(use, address, names, known)
+        return result
+
+    def _is_clean(self, known: MeshEntry, use: MeshUse, names: frozenset[str]) -> bool:
+        geometry = self.updates.geometry
+        return (not self.updates.everything and known.fingerprint == fingerprint_of(use) and known.names == names
+                and not geometry.intersection((*use.key[:2], use.original_data)))
+
+    @staticmethod
+    def _names(use: MeshUse) -> frozenset[str]:
+        attributes = getattr(use.data, "attributes", ())
+        return frozenset(name for name in use.wanted if name == "" or name in attributes)
+
+    def _read_mesh(self, use: MeshUse, address: int, names: frozenset[str], known: MeshEntry | None) -> MeshEntry:
+        entry = MeshEntry(known.handle if known else None, use.key, address, fingerprint_of(use), names)
+        arguments = None
+        try:
+            mesh = use.data if use.maker is None else use.maker.to_mesh()
+            arguments = read_mesh(mesh, names) if mesh is not None else None
+            if arguments is not None:
+                self._store_mesh(entry, known, arguments, use.name)
+        except Exception as error:  # noqa: BLE001  the render goes on without the object
+            self.warn(f"Object '{use.name}': its mesh cannot be used ({error}): left out")
+            entry.handle = None
+        finally:
+            if use.maker is not None:
+                use.maker.to_mesh_clear()
+        if arguments is None:
+            entry.handle = None
+        return entry
+
+    def _store_mesh(self, entry: MeshEntry, known: MeshEntry | None, arguments: dict[str, Any], name: str) -> None:
+        self.report.meshes += 1
+        if known is None:
+            entry.handle = self.scene.add_mesh(name=name, **arguments)
+            return
+        entry.topology = topology(arguments)
+        if known.topology == entry.topology:
+            arguments = {key: arguments[key] for key in ("positions", "corner_normals", "vertex_normals") if key in arguments}
+        self.scene.set_mesh(entry.handle, **arguments)
+
+    # -- groups
+
+    def _remove_group(self, group: Group) -> None:
+        if len(group.handles):
+            self.scene.remove_instances(group.handles)
+            self.report.removed += len(group.handles)
+        group.handles, group.mesh_handle = np.empty(0, np.uint32), None
+
+    def _store_group(self, walk: Walk, mesh: int | None) -> None:
+        group = walk.group
+        transforms = stack_matrices(walk.matrices)
+        randoms = np.array(walk.randoms, np.int64).astype(np.uint32)
+        if group.mesh_handle != mesh or not np.array_equal(randoms, group.randoms):
+            self._remove_group(group)
+            if mesh is not None:
+                group.handles = self.scene.add_instances(
+                    mesh, transforms, randoms=(randoms / np.float64(0xFFFFFFFF)).astype(np.float32), **group.properties)
+                self.report.instances += len(transforms)
+            group.mesh_handle = mesh
+        elif len(group.handles):
+            moved = (transforms != group.transforms).any((1, 2))
+            if moved.any():
+                self.scene.set_transforms(group.handles[moved], transforms[moved])
+                self.report.moved += int(moved.sum())
+            changed = {name: value for name, value in group.properties.items() if group.shown[name] != value}
+            if changed:
+                self.scene.set_instances(group.handles, **changed)
+                self.report.instances += len(group.handles)
+        group.transforms, group.randoms, group.shown = transforms, randoms, group.properties
+
+    # -- lights
+
+    def _light(self, instance: Any, ob: Any, data: Any, key: GroupKey) -> None:
+        if is_portal(data):
+            return
+        bits, _, _ = object_visibility(ob, instance.parent if instance.is_instance else None, self.layer)
+        transform = stack_matrices([instance.matrix_world.copy()])[0]
+        try:
+            arguments = read_light(data, transform, self.materials.context(f"Light '{ob.name}'"), bits)
+        except Exception as error:  # noqa: BLE001
+            self.warn(f"Light '{ob.name}': cannot be read ({error}): left out")
+            return
+        arguments["name"] = ob.name
+        self._store_light(key, arguments)
+
+    def _store_light(self, key: GroupKey, arguments: dict[str, Any]) -> None:
+        self.next_lights.add(key)
+        images, sign, known = self.materials.images_of(arguments.get("graph")), digest(arguments), self.lights.get(key)
+        if known is not None and known.key == sign:
+            return
+        kind = arguments["kind"]
+        self.report.lights += 1
+        if known is not None and known.kind == kind:
+            given = {name: value for name, value in arguments.items() if name != "kind"}
+            self.scene.set_light(known.handle, **{"graph": None, **given})
+            handle = known.handle
+        else:
+            if known is not None:
+                self.scene.remove_light(known.handle)
+            handle = self.scene.add_light(**arguments)
+        self.lights[key] = LightEntry(handle, kind, sign, images)
+
+
+NOTHING, LIGHT = Walk((0, 0, 0), None), Walk((0, 0, 0), None)
+
+
+def fingerprint_of(use: MeshUse) -> tuple[int, ...]:
+    return (0,) if use.maker is not None else fingerprint(use.data)
+
+
+def topology(arguments: dict[str, Any]) -> int:
+    """A checksum of everything in a mesh but its positions and normals."""
+    arrays = [arguments["triangles"], arguments.get("corners"), arguments.get("faces"), arguments.get("materials"),
+              arguments.get("smooth"), *arguments["uvs"].values(), *(values for _, values in arguments["attributes"].values())]
+    sign = zlib.crc32(repr((list(arguments["uvs"]), arguments["active_uv"], list(arguments["attributes"]), len(arguments["positions"]),
+                            arguments["active_color"], "corner_normals" in arguments, "vertex_normals" in arguments)).encode())
+    for array in arrays:
+        if array is not None:
+            sign = zlib.crc32(np.ascontiguousarray(array).view(np.uint8).reshape(-1), sign)
+    return sign
