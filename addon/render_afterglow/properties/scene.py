@@ -88,7 +88,7 @@ class AfterglowSceneSettings(bpy.types.PropertyGroup):
     )
     use_preview_denoising: BoolProperty(name="Denoise", description="Denoise the viewport while it refines", default=False)
     preview_pause: BoolProperty(name="Pause Viewport", description="Hold all viewports as they are", default=False)
-    file_version: IntProperty(default=0, options={"HIDDEN"})
+    file_version: IntProperty(description="Version of the settings that the file holds", default=0, options={"HIDDEN"})
 
     @classmethod
     def poll_denoise(cls) -> str:
@@ -140,7 +140,9 @@ def register() -> None:
         name="Method", description="How indirect light is computed", items=methods.method_items(), default="AUTO"
     )
     for name, group in methods._groups.items():
-        AfterglowSceneSettings.__annotations__[name] = PointerProperty(type=group)
+        AfterglowSceneSettings.__annotations__[name] = PointerProperty(
+            type=group, name=name.replace("_", " ").title(), description="Settings of this method alone"
+        )
     bpy.utils.register_class(AfterglowSceneSettings)
 
 
