@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/cancel.h"
 #include "base/math.h"
 
 namespace afterglow {
@@ -23,15 +24,20 @@ struct DenoiseInput {
   const float* normal = nullptr;
   uint32_t width = 0, height = 0;
   bool hdr = true, fast = false, clean_auxiliary = false;
+  StopToken stop{};  // asked between the filter's layers: Cancelled
 };
 
 class Denoiser {
  public:
   virtual ~Denoiser() = default;
-  virtual void filter(const DenoiseInput&, float* output) = 0;  // throws Error with the library's own text
+  /// output may be color. Non-finite values are replaced by their neighbours' mean first; returns how many there were.
+  /// Throws Error with the library's own text. Keep the Denoiser between frames: its first call sets up the filter.
+  virtual uint64_t filter(const DenoiseInput&, float* output) = 0;
 };
 
+/// search: folders or files to look at after what the process has mapped already and before the system's libraries.
 std::vector<DenoiserInfo> list_denoisers(const std::vector<std::string>& search);
-std::unique_ptr<Denoiser> make_denoiser(const std::string& id, const std::vector<std::string>& search);  // Unsupported
+/// id "AUTO": the first that is available. Throws Unsupported with the reason.
+std::unique_ptr<Denoiser> make_denoiser(const std::string& id, const std::vector<std::string>& search);
 
 }  // namespace afterglow

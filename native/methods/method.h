@@ -3,6 +3,7 @@
 // methods/ and one line in methods/list.cpp; it never reads Blender's data and never draws.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <span>
 #include <string>
@@ -20,6 +21,7 @@ struct PixelRequest;
 class Film;
 
 using SettingValue = std::variant<bool, int64_t, double, std::string>;
+using Settings = std::vector<std::pair<std::string, SettingValue>>;
 struct SettingDescription {
   std::string name, label, description, unit;
   SettingValue default_value;
@@ -56,7 +58,10 @@ struct Work {
   StopToken stop;
   uint64_t seed = 0;
   uint32_t pass = 0;
-  uint32_t threads = 0;  // 0: all
+  uint32_t threads = 0;                           // 0: all
+  const std::vector<uint64_t>* shown = nullptr;   // local view: one bit an instance (InstanceMask); null: everything
+  const std::atomic<bool>* pause = nullptr;       // while true, no new request is begun
+  std::atomic<uint64_t>* samples_done = nullptr;  // grows as requests are finished
 };
 
 struct MethodStatistics {
@@ -67,7 +72,7 @@ class IndirectMethod {
  public:
   virtual ~IndirectMethod() = default;
   virtual MethodTraits traits() const = 0;
-  virtual void configure(const std::vector<std::pair<std::string, SettingValue>>&) = 0;
+  virtual void configure(const Settings&) = 0;  // names that are not its own are left alone
   virtual void update(const CommittedScene&, const SceneChanges&, Work&) = 0;           // invalidate and repair
   virtual bool refine(const CommittedScene&, Work&) = 0;                                // one whole pass; false: done
   virtual void prepare(const CommittedScene&, std::span<const CachePoint>, Work&) = 0;  // a wavefront; may insert

@@ -3,6 +3,8 @@
 // all of them in step. Methods and the renderer read it; only commit() writes it, and no reader may run meanwhile.
 #pragma once
 
+#include <shared_mutex>
+
 #include "lights/lights.h"
 #include "rays/ray_caster.h"
 #include "scene/changes.h"
@@ -18,6 +20,10 @@ struct CommittedScene {
   Lights lights;
   Effects effects;
   double commit_seconds = 0.0;
+  bool broken = false;  // a commit failed half-way: the next one rebuilds everything
+  /// Who renders holds it shared for as long as its threads read; who edits or commits holds it alone. The module's
+  /// edits do not wait for it: they tell the user to edit inside `with session.edit()`.
+  mutable std::shared_mutex use;
 
   /// Changes since the last commit, warnings of every layer included.
   SceneChanges commit(RayCaster::Options options);

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Accumulation and resolution of the film's passes.
+#include "film/film.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace afterglow {
+
+namespace {
+
+uint32_t stored_floats(Pass pass) {
+  switch (pass) {
+    case Pass::kSampleCount:
+    case Pass::kError:
+      return 0;  // made from others
+    default:
+      return pass_info(pass).channels;
+  }
+}
+
+uint32_t batch_samples(uint32_t samples, uint32_t batch) {
+  return samples / kBatchCount + (batch < samples % kBatchCount ? 1u : 0u);
+}
+
+}  // namespace
+
+FilmSettings completed(FilmSettings s) {
+  s.passes |= kAlwaysKept;
+  if (s.x1 == 0 || s.x1 > s.width) s.x1 = s.width;
+  if (s.y1 == 0 || s.y1 > s.height) s.y1 = s.height;
+  s.x0 = std::min(s.x0, s.x1), s.y0 = std::min(s.y0, s.y1);
+  // A light pass is read divided by its colour.
+  const PassSet direct = bit(Pass::kDiffuseDirect) | bit(Pass::kDiffuseIndirect);
+  if (s.passes & direct) s.passes |= bit(Pass::kDiffuseColor);
+  if (s.passes & (direct << 3)) s.passes |= bit(Pass::kGlossyColor);
+  if (s.passes & (direct << 6)) s.passes |= bit(Pass::kTransmissionColor);
+  return s;
+}
+
+FilmLayout::FilmLayout(PassSet passes) {
+  at.fill(-1);
+  for (int i = 0; i < kPassCount; ++i) {
+    const uint32_t size = stored_floats(Pass(i));
+    if (!(passes & (1u << i)) || !size) continue;
+    at[size_t(i)] = int16_t(floats);
+    floats += int(size);
+  }
+}
+
+/// The lock of the strip that a pixel lies in.
+class Film::Lock {
+ public:
+  Lock(const Film& film, size_t pixel) : flag_(film.locks_[pixel / 32]) {
+    while (flag_.test_and_set(std::memory_order_acquire)) {
+    }
+  }
+  ~Lock() { flag_.clear(std::memory_order_release); }
+
+ private:
+  std::atomic_flag& flag_;
+};
+
+Film::Film(const FilmSettings& settings)
+    : settings_(completed(settings)),
+      layout_(settings_.passes),
+      filter_(settings_.filter, settings_.filter_width),
+      sums_(size_t(width()) * height() * size_t(layout_.floats)),
+      counts_(size_t(width()) * height()),
+      locks_(counts_.size() / 32 + 1) {}
+
+size_t Film::bytes() const { return sums_.size() * sizeof(float) + counts_.size() * sizeof(uint32_t) + locks_.size(); }
+
+void Film::clear() {
+  std::fill(sums_.begin(), sums_.end(), 0.0f);
+  std::fill(counts_.begin(), counts_.end(), 0u);
+}
+
+void Film::add(uint32_t x, uint32_t y, const float* sums, uint32_t samples) {
+  const size_t pixel = size_t(y - settings_.y0) * width() + (x - settings_.x0);
+  float* to = sums_.data() + pixel * size_t(layout_.floats);
+  const Lock lock(*this, pixel);
+  for (int i = 0; i < layout_.floats; ++i) to[i] += sums[i];
+  counts_[pixel] += samples;
+}
+
+float standard_error(const float* batch_sums, uint32_t samples) {
+  const uint32_t batches = std::min<uint32_t>(samples, kBatchCount);
+  if (batches < 2) return 0.0f;
+  double mean = 0.0, variance = 0.0;
+  for (uint32_t b = 0; b < batches; ++b) mean += batch_sums[b];
+  mean /= samples;
+  for (uint32_t b = 0; b < batches; ++b) {
+    const double n = batch_samples(samples, b), off = batch_sums[b] / n - mean;
+    variance += n * off * off;
+  }
+  return float(std::sqrt(variance / (double(samples) * (batches - 1))));
+}
+
+void Film::read_pixel(Pass pass, const float* sums, uint32_t samples, float* out) const {
+  const float scale = samples ? 1.0f / float(samples) : 0.0f, exposed = scale * settings_.exposure;
+  const float* from = layout_[pass] >= 0 ? sums + layout_[pass] : nullptr;
+  const int channels = pass_info(pass).channels;
+  const auto copy = [&](float factor) {
+    for (int c = 0; c < channels; ++c) out[c] = from ? from[c] * factor : 0.0f;
+  };
+  const auto divided = [&](Pass color_pass) {
+    const float* color = sums + layout_[color_pass];
+    for (int c = 0; c < 3; ++c) out[c] = from && color[c] > 0.0f ? from[c] / color[c] * settings_.exposure : 0.0f;
+  };
+  switch (pass) {
+    case Pass::kCombined:
+      copy(exposed);
+      out[3] = samples ? std::clamp(1.0f - from[3] * scale, 0.0f, 1.0f) : 0.0f;
+      break;
+    case Pass::kDepth:
+    case Pass::kPosition:
+    case Pass::kObjectIndex:
+    case Pass::kMaterialIndex:
+      copy(1.0f);  // the first sample's
+      break;
+    case Pass::kMist:
+      out[0] = from ? 1.0f - from[0] * scale : 0.0f;
+      break;
+    case Pass::kDiffuseDirect:
+    case Pass::kDiffuseIndirect:
+      divided(Pass::kDiffuseColor);
+      break;
+    case Pass::kGlossyDirect:
+    case Pass::kGlossyIndirect:
+      divided(Pass::kGlossyColor);
+      break;
+    case Pass::kTransmissionDirect:
+    case Pass::kTransmissionIndirect:
+      divided(Pass::kTransmissionColor);
+      break;
+    case Pass::kEmission:
+    case Pass::kEnvironment:
+      copy(exposed);
+      break;
+    case Pass::kSampleCount:
+      out[0] = float(samples);
+      break;
+    case Pass::kError:
+      out[0] = standard_error(sums + layout_[Pass::kBatches], samples) * settings_.exposure;
+      break;
+    case Pass::kBatches:
+      for (uint32_t b = 0; b < kBatchCount; ++b) {
+        const uint32_t n = batch_samples(samples, b);
+        out[b] = n ? from[b] / float(n) * settings_.exposure : 0.0f;
+      }
+      break;
+    default:
+      copy(scale);
+  }
+}
+
+void Film::read(Pass pass, float* out, uint32_t step) const {
+  const size_t channels = pass_info(pass).channels;
+  const uint32_t w = width(), h = height();
+  std::array<float, FilmLayout::kMaxFloats> sums;
+  for (uint32_t y = 0; y < h; ++y)
+    for (uint32_t x = 0; x < w; ++x) {
+      float* to = out + (size_t(y) * w + x) * channels;
+      if (x % step) {
+        std::memcpy(to, to - channels, channels * sizeof(float));
+        continue;
+      }
+      if (y % step) {
+        std::memcpy(to, to - size_t(w) * channels, channels * sizeof(float));
+        continue;
+      }
+      const size_t pixel = size_t(y) * w + x;
+      uint32_t samples;
+      {
+        const Lock lock(*this, pixel);
+        std::memcpy(sums.data(), sums_.data() + pixel * size_t(layout_.floats), size_t(layout_.floats) * sizeof(float));
+        samples = counts_[pixel];
+      }
+      read_pixel(pass, sums.data(), samples, to);
+    }
+}
+
+BelievedError Film::believed_error() const {
+  const size_t pixels = counts_.size(), batches = size_t(layout_[Pass::kBatches]);
+  std::vector<float> means(pixels), variances(pixels);
+  double total = 0.0;
+  for (size_t p = 0; p < pixels; ++p) {
+    std::array<float, kBatchCount> sums;
+    uint32_t samples;
+    {
+      const Lock lock(*this, p);
+      std::memcpy(sums.data(), sums_.data() + p * size_t(layout_.floats) + batches, sizeof(sums));
+      samples = counts_[p];
+    }
+    if (samples < 2) return {};
+    float sum = 0.0f;
+    for (float s : sums) sum += s;
+    const float error = standard_error(sums.data(), samples);
+    means[p] = sum / float(samples), variances[p] = error * error;
+    total += means[p];
+  }
+  if (!pixels) return {};
+  BelievedError result{0.0f, 0.0f, 0.0f};
+  if (!(total > 0.0)) return result;
+  const double e = 0.5 * double(pixels) / total;
+  double sum = 0.0, squares = 0.0;
+  for (size_t p = 0; p < pixels; ++p) {
+    const double m = e * means[p], r = e * e * variances[p] / (m * m + 0.01);
+    sum += r, squares += r * r;
+  }
+  const double mean = sum / double(pixels);
+  const double spread = 1.96 * std::sqrt(std::max(0.0, squares / double(pixels) - mean * mean) / double(pixels));
+  result.value = float(std::sqrt(mean));
+  result.low = float(std::sqrt(std::max(0.0, mean - spread)));
+  result.high = float(std::sqrt(mean + spread));
+  return result;
+}
+
+}  // namespace afterglow

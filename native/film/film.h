@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where samples come together: sums of every kept pass for each pixel of a region, sixteen batch sums of luminance that
+// tell the error, and what a reader gets from them. Writers and readers share pixels under one small lock for every
+// strip of 32, so that an image can be read at any time without stopping the render.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "film/passes.h"
+#include "film/pixel_filter.h"
+
+namespace afterglow {
+
+struct FilmSettings {
+  uint32_t width = 640, height = 360;       // of the full image
+  uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;  // region, row 0 at the bottom; x1 = 0: everything
+  PixelFilterKind filter = PixelFilterKind::kBlackmanHarris;
+  float filter_width = 1.5f;
+  bool transparent = false;
+  float exposure = 1.0f;
+  PassSet passes = kAlwaysKept;
+  float mist_start = 5.0f, mist_depth = 25.0f;
+  uint8_t mist_falloff = 0;  // 0 quadratic, 1 linear, 2 inverse quadratic
+  bool operator==(const FilmSettings&) const = default;
+};
+
+/// The same with the region made whole and the passes that others are read with.
+FilmSettings completed(FilmSettings);
+
+/// A block of pixels to sample: every `step`th pixel of a rectangle, `count` samples from number `first` on. Pixels are
+/// those of the full image and lie in the film's region.
+struct PixelRequest {
+  uint16_t x = 0, y = 0, width = 1, height = 1, step = 1;
+  /// Leaves out the pixels that stand on a grid of this step, because an earlier request had them; 0: none.
+  uint16_t skip = 0;
+  uint32_t first = 0, count = 1;
+};
+
+/// Samples that a request takes, those left out not counted.
+inline uint64_t sample_count(const PixelRequest& r) {
+  const auto on_grid = [&](uint64_t step) { return ((r.width + step - 1) / step) * ((r.height + step - 1) / step); };
+  return (on_grid(r.step) - (r.skip ? on_grid(r.skip) : 0)) * r.count;
+}
+
+/// Where each kept pass begins among the floats of one pixel; −1: not kept.
+struct FilmLayout {
+  explicit FilmLayout(PassSet);
+  std::array<int16_t, kPassCount> at;
+  int floats = 0;
+  static constexpr int kMaxFloats = 112;
+  int operator[](Pass p) const { return at[size_t(p)]; }
+};
+
+/// Relative error of a whole image as its samples make believe: sqrt(mean(var / (mean² + 0.01))) of luminance, exposed
+/// to a mean of 0.5, with its own 95 % interval. Negative: not known yet.
+struct BelievedError {
+  float value = -1.0f, low = -1.0f, high = -1.0f;
+};
+
+class Film {
+ public:
+  explicit Film(const FilmSettings&);
+  const FilmSettings& settings() const { return settings_; }
+  const FilmLayout& layout() const { return layout_; }
+  const PixelFilter& filter() const { return filter_; }
+  uint32_t width() const { return settings_.x1 - settings_.x0; }
+  uint32_t height() const { return settings_.y1 - settings_.y0; }
+  size_t bytes() const;
+
+  /// Adds the sums of `samples` samples of one pixel of the full image: layout().floats values.
+  void add(uint32_t x, uint32_t y, const float* sums, uint32_t samples);
+  void clear();
+
+  /// A pass over the region, row 0 at the bottom, pass_info(pass).channels values a pixel. step > 1: only every step-th
+  /// pixel has samples; the others are shown as their block's first.
+  void read(Pass, float* out, uint32_t step = 1) const;
+  BelievedError believed_error() const;
+
+ private:
+  class Lock;
+  void read_pixel(Pass, const float* sums, uint32_t samples, float* out) const;
+  FilmSettings settings_;
+  FilmLayout layout_;
+  PixelFilter filter_;
+  std::vector<float> sums_;
+  std::vector<uint32_t> counts_;
+  mutable std::vector<std::atomic_flag> locks_;
+};
+
+/// Standard error of the mean of n samples from their sixteen batch sums (sample i is in batch i % 16); 0 when n < 2.
+float standard_error(const float* batch_sums, uint32_t samples);
+
+}  // namespace afterglow

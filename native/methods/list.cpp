@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The list of all methods: a new one is its folder and one line here.
+#include "base/errors.h"
+#include "methods/path_tracing/path_tracing.h"
+
+namespace afterglow {
+
+namespace {
+
+struct Entry {
+  MethodDescription (*describe)();
+  std::unique_ptr<IndirectMethod> (*make)();
+};
+
+constexpr Entry kEntries[] = {
+    {path_tracing::describe, path_tracing::make},
+};
+
+}  // namespace
+
+const std::vector<MethodDescription>& method_descriptions() {
+  static const std::vector<MethodDescription> descriptions = [] {
+    std::vector<MethodDescription> all;
+    for (const Entry& entry : kEntries) all.push_back(entry.describe());
+    return all;
+  }();
+  return descriptions;
+}
+
+std::unique_ptr<IndirectMethod> make_method(const std::string& id) {
+  std::string known;
+  for (size_t i = 0; i < method_descriptions().size(); ++i) {
+    const std::string& name = method_descriptions()[i].id;
+    if (name == id) return kEntries[i].make();
+    known += (i ? ", " : "") + name;
+  }
+  throw InvalidInput("no method is called '" + id + "'; known methods: AUTO, " + known);
+}
+
+}  // namespace afterglow

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the path tracer does with a walk: light goes into the picture and, where asked for, into the pass of the first
+// surface's lobe that it came through; the first surfaces write the data passes.
+#pragma once
+
+#include <cstring>
+
+#include "methods/path_tracing/kernel.h"
+
+namespace afterglow::path_tracing {
+
+template <bool kPasses>
+class FilmVisitor {
+ public:
+  FilmVisitor(const KernelInput& in, RayCounts& counts) : in_(in), layout_(in.film.layout()), counts_(counts) {}
+
+  const float* sums() const { return sums_; }
+  void begin_pixel() { std::memset(sums_, 0, sizeof(float) * size_t(layout_.floats)); }
+  void begin_sample(const PathState& path, uint32_t index) {
+    index_ = index;
+    light_ = Rgb(0.0f);
+    transparent_ = 0.0f;
+    if constexpr (kPasses) {
+      eye_ = path.ray.origin;
+      diffuse_share_ = glossy_share_ = transmission_share_ = Rgb(0.0f);
+      surface_known_ = features_known_ = false;
+    }
+  }
+  void end_sample() {
+    float* combined = sums_ + layout_[Pass::kCombined];
+    for (int c = 0; c < 3; ++c) combined[c] += light_[c];
+    combined[3] += transparent_;
+    sums_[layout_[Pass::kBatches] + int(index_ % kBatchCount)] += luminance(light_);
+  }
+
+  bool surface(const PathState& path, const SurfacePoint& point, const Surface& surface) {
+    if constexpr (kPasses) {
+      if (path.context.depth == 0) write_surface(path, point, surface);
+      if (!features_known_) write_features(path, point, surface);
+    }
+    return true;
+  }
+
+  void lit(const PathState& path, const BsdfValue& value, const Rgb& light) {
+    const bool direct = path.context.depth == 0;
+    const Rgb arriving = path.throughput * light;
+    const Rgb c = kept(arriving * value.total(), direct);
+    light_ += c;
+    if constexpr (kPasses) {
+      if (direct) {
+        const Rgb share = c / glm::max(arriving * value.total(), Rgb(1e-38f));
+        add(Pass::kDiffuseDirect, arriving * value.diffuse * share);
+        add(Pass::kGlossyDirect, arriving * value.glossy * share);
+        add(Pass::kTransmissionDirect, arriving * value.transmission * share);
+      } else {
+        add_shared(false, c);
+      }
+    }
+  }
+
+  void scattered(const PathState& path, const BsdfSample& s) {
+    if constexpr (kPasses) {
+      if (path.context.depth != 0) return;
+      const Rgb scale = 1.0f / glm::max(s.value.total(), Rgb(1e-38f));
+      diffuse_share_ = s.value.diffuse * scale;
+      glossy_share_ = s.value.glossy * scale;
+      transmission_share_ = s.value.transmission * scale;
+    }
+  }
+
+  void emitted(const PathState& path, const Rgb& light) {
+    const Rgb c = kept(path.throughput * light, path.context.depth <= 1);
+    light_ += c;
+    if constexpr (kPasses) {
+      if (path.context.depth == 0) {
+        add(Pass::kEmission, c);
+        if (!features_known_) add(Pass::kAlbedo, glm::min(c, Rgb(1.0f)));
+      } else {
+        add_shared(path.context.depth == 1, c);
+      }
+    }
+  }
+
+  void escaped(const PathState& path, const Rgb& light) {
+    const Rgb c = kept(path.throughput * light, path.context.depth <= 1);
+    const bool hole = path.context.depth == 0 && in_.film.settings().transparent;
+    if (hole)
+      transparent_ += (path.throughput.x + path.throughput.y + path.throughput.z) / 3.0f;
+    else
+      light_ += c;
+    if constexpr (kPasses) {
+      if (path.context.depth == 0)
+        add(Pass::kEnvironment, c);
+      else
+        add_shared(path.context.depth == 1, c);
+      if (!features_known_) add(Pass::kAlbedo, glm::min(c, Rgb(1.0f)));
+    }
+  }
+
+  void held_out(const PathState& path, float share) {
+    transparent_ += share * (path.throughput.x + path.throughput.y + path.throughput.z) / 3.0f;
+  }
+
+ private:
+  /// Clamped, finite and not negative; what is dropped is counted.
+  Rgb kept(const Rgb& light, bool direct) {
+    const float sum = light.x + light.y + light.z;
+    if (!(std::fabs(sum) < kInfinity)) {
+      counts_.dropped++;
+      return Rgb(0.0f);
+    }
+    const float limit = direct ? in_.clamp_direct : in_.clamp_indirect;
+    return glm::max(sum > limit ? light * (limit / sum) : light, Rgb(0.0f));
+  }
+
+  void add(Pass pass, const Rgb& value) {
+    const int at = layout_[pass];
+    if (at < 0) return;
+    for (int c = 0; c < 3; ++c) sums_[at + c] += value[c];
+  }
+
+  void add_shared(bool direct, const Rgb& light) {
+    add(direct ? Pass::kDiffuseDirect : Pass::kDiffuseIndirect, light * diffuse_share_);
+    add(direct ? Pass::kGlossyDirect : Pass::kGlossyIndirect, light * glossy_share_);
+    add(direct ? Pass::kTransmissionDirect : Pass::kTransmissionIndirect, light * transmission_share_);
+  }
+
+  static Vec3 mean_normal(const SurfacePoint& point, const Surface& surface) {
+    Vec3 sum(0.0f);
+    for (int i = 0; i < surface.count; ++i)
+      sum +=
+          surface.lobes[i].normal * (surface.lobes[i].weight.x + surface.lobes[i].weight.y + surface.lobes[i].weight.z);
+    const float length = glm::length(sum);
+    return length > 0.0f ? sum / length : point.normal;
+  }
+
+  void set(Pass pass, float value) {
+    if (layout_[pass] >= 0) sums_[layout_[pass]] = value;
+  }
+
+  void write_surface(const PathState& path, const SurfacePoint& point, const Surface& surface);
+  void write_features(const PathState& path, const SurfacePoint& point, const Surface& surface);
+
+  const KernelInput& in_;
+  const FilmLayout& layout_;
+  RayCounts& counts_;
+  uint32_t index_ = 0;
+  Rgb light_{0.0f};
+  float transparent_ = 0.0f;
+  Vec3 eye_{0.0f};
+  Rgb diffuse_share_{0.0f}, glossy_share_{0.0f}, transmission_share_{0.0f};  // of the first surface's lobes
+  bool surface_known_ = false, features_known_ = false;
+  float sums_[FilmLayout::kMaxFloats];
+};
+
+/// Data passes of the first surface that is more opaque than not, colours and mist of all up to there, weighted by what
+/// shows through.
+template <bool kPasses>
+void FilmVisitor<kPasses>::write_surface(const PathState& path, const SurfacePoint& point, const Surface& surface) {
+  const Scene& scene = in_.walk.scene.scene;
+  const Rgb alpha = Rgb(1.0f) - surface.transparency;
+  if (!surface_known_ && (alpha.x + alpha.y + alpha.z) / 3.0f >= 0.5f) {
+    surface_known_ = true;
+    if (index_ == 0) {
+      const InstanceRecord& instance = scene.instances()[point.instance];
+      set(Pass::kDepth, in_.camera.depth(point.position));
+      set(Pass::kObjectIndex, float(instance.object_index));
+      if (layout_[Pass::kMaterialIndex] >= 0) {
+        const Handle material = scene.material_handles()[point.material];
+        set(Pass::kMaterialIndex, material ? float(scene.material(material).pass_index) : 0.0f);
+      }
+      add(Pass::kPosition, Vec3(DVec3(point.position) + scene.origin()));
+    }
+    add(Pass::kNormal, mean_normal(point, surface));
+    add(Pass::kUv, Vec3(point.uv, 1.0f));
+  }
+  if (layout_[Pass::kDiffuseColor] >= 0 || layout_[Pass::kGlossyColor] >= 0 || layout_[Pass::kTransmissionColor] >= 0) {
+    const SurfaceAlbedo color = albedo(surface, point.outgoing);
+    add(Pass::kDiffuseColor, path.throughput * color.diffuse);
+    add(Pass::kGlossyColor, path.throughput * color.glossy);
+    add(Pass::kTransmissionColor, path.throughput * color.transmission);
+  }
+  if (const int at = layout_[Pass::kMist]; at >= 0) {
+    const FilmSettings& s = in_.film.settings();
+    float mist =
+        glm::clamp((glm::distance(eye_, point.position) - s.mist_start) / std::fmax(s.mist_depth, 1e-6f), 0.0f, 1.0f);
+    mist = s.mist_falloff == 0 ? mist * mist : s.mist_falloff == 1 ? mist : std::sqrt(mist);
+    const Rgb covered = path.throughput * alpha;
+    sums_[at] += (1.0f - mist) * (covered.x + covered.y + covered.z) / 3.0f;
+  }
+}
+
+/// Albedo and normal for the denoiser: of the first surface that is not all but a mirror or clear glass.
+template <bool kPasses>
+void FilmVisitor<kPasses>::write_features(const PathState& path, const SurfacePoint& point, const Surface& surface) {
+  if (layout_[Pass::kAlbedo] < 0 && layout_[Pass::kDenoiseNormal] < 0) return;
+  float sharp = 0.0f, all = 0.0f;
+  for (int i = 0; i < surface.count; ++i) {
+    const Lobe& lobe = surface.lobes[i];
+    const float weight = lobe.weight.x + lobe.weight.y + lobe.weight.z;
+    all += weight;
+    if (lobe.kind >= LobeKind::kMicrofacetReflection && lobe.alpha_x * lobe.alpha_y < 0.15f * 0.15f) sharp += weight;
+  }
+  all += surface.transparency.x + surface.transparency.y + surface.transparency.z;
+  sharp += surface.transparency.x + surface.transparency.y + surface.transparency.z;
+  if (sharp > 0.75f * all && !path.last && path.context.depth < 4) return;
+  features_known_ = true;
+  const SurfaceAlbedo color = albedo(surface, point.outgoing);
+  add(Pass::kAlbedo,
+      glm::min(path.throughput, Rgb(1.0f)) * glm::min(color.diffuse + color.glossy + color.transmission, Rgb(1.0f)));
+  add(Pass::kDenoiseNormal, mean_normal(point, surface));
+}
+
+}  // namespace afterglow::path_tracing

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One view of a committed scene through one method: the only way in is a list of pixel requests.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "film/film.h"
+#include "methods/method.h"
+#include "transport/committed_scene.h"
+
+namespace afterglow {
+
+class Renderer {
+ public:
+  /// AUTO: what suits the scene. Throws InvalidInput for an unknown method.
+  explicit Renderer(const std::string& method);
+  const std::string& method() const { return id_; }
+  void configure(const Settings& settings) { method_->configure(settings); }
+
+  /// Brings the method up to date with the scene. Not while render() runs.
+  void update(const CommittedScene&, Work&);
+  void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&);
+  MethodStatistics statistics() const { return method_->statistics(); }
+
+ private:
+  std::string id_;
+  std::unique_ptr<IndirectMethod> method_;
+  uint64_t version_ = 0;
+};
+
+}  // namespace afterglow

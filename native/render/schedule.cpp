@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Sizes of passes and their pixels.
+#include "render/schedule.h"
+
+#include <algorithm>
+
+namespace afterglow {
+
+namespace {
+
+uint32_t next_count(uint32_t done, bool timed) {
+  if (timed) {  // an eighth of what is done, as a power of two
+    uint32_t count = 1;
+    while (count * 16 <= done) count *= 2;
+    return std::min(count, 64u);
+  }
+  if (done < 2) return 1;
+  if (done < 16) return done;
+  return 16;
+}
+
+}  // namespace
+
+PassPlan plan_pass(const ScheduleOptions& options, uint32_t index, uint32_t done) {
+  if (options.viewport && index <= kCoarsePasses)
+    return {0, options.samples ? 1u : 0u, 8u >> index, index ? 16u >> index : 0u};
+  const uint32_t wanted = options.viewport ? (done < 16 ? 1u : 2u) : next_count(done, options.timed);
+  return {done, std::min(wanted, options.samples - std::min(done, options.samples)), 1, 0};
+}
+
+std::vector<PixelRequest> pass_requests(const PassPlan& plan, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1) {
+  // About a thousand samples a request: small enough to share out evenly, large enough to forget the sharing.
+  uint32_t side = 16;
+  while (side > 4 && side * side * plan.count > 2048) side /= 2;
+  side *= plan.step;
+  std::vector<PixelRequest> requests;
+  requests.reserve(size_t((x1 - x0) / side + 1) * ((y1 - y0) / side + 1));
+  for (uint32_t y = y0; y < y1; y += side)
+    for (uint32_t x = x0; x < x1; x += side)
+      requests.push_back({.x = uint16_t(x),
+                          .y = uint16_t(y),
+                          .width = uint16_t(std::min(side, x1 - x)),
+                          .height = uint16_t(std::min(side, y1 - y)),
+                          .step = uint16_t(plan.step),
+                          .skip = uint16_t(plan.skip),
+                          .first = plan.first,
+                          .count = plan.count});
+  return requests;
+}
+
+}  // namespace afterglow

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a render does next, decided by pure functions: how many samples each pass takes, which pixels a viewport pass
+// adds, when to stop. Time decides only how many whole passes run, never what a pass contains.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "film/film.h"
+
+namespace afterglow {
+
+struct PassPlan {
+  uint32_t first = 0, count = 0;  // samples; count 0: nothing is left
+  uint32_t step = 1;              // pixels: every step-th, those of the pass before left out
+  uint32_t skip = 0;
+};
+
+struct ScheduleOptions {
+  uint32_t samples = 128;
+  bool viewport = false;
+  bool timed = false;  // small passes, so that a time limit is met closely
+};
+
+/// Pass number `index` of a render, when `done` samples stand in every pixel.
+PassPlan plan_pass(const ScheduleOptions&, uint32_t index, uint32_t done);
+inline constexpr uint32_t kCoarsePasses = 3;  // of a viewport, before every pixel has its first sample
+
+/// The pass as requests over a region, in an order that keeps neighbours together.
+std::vector<PixelRequest> pass_requests(const PassPlan&, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1);
+
+/// Whether a believed error is to be looked at after this many samples: when all batches hold the same number.
+inline bool error_is_due(uint32_t samples) { return samples >= 2 * kBatchCount && samples % kBatchCount == 0; }
+
+/// Whether the next pass would end after the limit, if its samples take as long as those before.
+inline bool limit_reached(double elapsed, double limit, uint32_t samples, uint32_t next) {
+  return limit > 0.0 && samples > 0 && (elapsed >= limit || elapsed + elapsed * next / samples > 1.02 * limit);
+}
+
+}  // namespace afterglow

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One background render that can be asked, changed, paused and cancelled from any thread. Its state is one struct with
+// defaults, replaced whole at every start; what to do next is decided in schedule.h and never here.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <exception>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "film/denoiser.h"
+#include "render/renderer.h"
+#include "render/schedule.h"
+#include "render/settings.h"
+
+namespace afterglow {
+
+enum class SessionState { kIdle, kRunning, kPaused, kFinished, kCancelled, kFailed };
+const char* state_name(SessionState);
+
+struct SessionProgress {
+  SessionState state = SessionState::kIdle;
+  double fraction = 0.0, elapsed = 0.0, remaining = -1.0, error = -1.0;  // negative: not known
+  uint32_t samples = 0;
+  uint64_t generation = 0;
+  std::string stage, failure;
+};
+
+struct SessionStatistics {
+  std::string method, denoiser;
+  uint32_t samples = 0, threads = 0, effects = 0;
+  double elapsed = 0.0;
+  std::map<std::string, double> seconds, method_values;
+  std::map<std::string, size_t> bytes;
+  BelievedError error;
+  std::vector<std::string> warnings;
+  struct Pass {
+    uint32_t first, count, step;
+    double seconds;
+  };
+  std::vector<Pass> passes;
+};
+
+class Session {
+ public:
+  Session(std::shared_ptr<const CommittedScene>, RenderSettings);
+  ~Session();
+  Session(const Session&) = delete;
+
+  void start();               // from the beginning; does nothing while it runs
+  bool wait(double timeout);  // true: finished or cancelled; rethrows what made it fail
+  void cancel();              // returns when the scene is not read any more
+  void pause();
+  void resume();
+  void begin_edit();  // stopped until end_edit(); may be nested
+  void end_edit();
+  void update(const NamedValues&);  // starts again when the image changes
+  RenderSettings settings() const;
+
+  SessionProgress progress() const;
+  SessionStatistics statistics() const;
+  /// Size of what read() writes: width, height.
+  std::pair<uint32_t, uint32_t> size() const;
+  PassSet passes() const;
+  /// One pass, width × height × channels floats; throws InvalidInput when it is not kept. Never waits for the render.
+  void read(Pass, std::vector<float>& out, uint32_t& width, uint32_t& height) const;
+
+ private:
+  struct Image {  // a finished picture that stands in for the film's
+    std::vector<float> rgba;
+    uint32_t width = 0, height = 0;
+  };
+
+  void stop_thread();
+  void launch();
+  void run(RenderSettings);
+  void render_passes(const RenderSettings&, Renderer&, Film&);
+  void publish(const RenderSettings&, const Film&, uint32_t step, bool filtered);
+  bool filter(const RenderSettings&, const Film&, Image&);
+  void warn(const std::string&);
+  double elapsed() const;
+  void set_stage(const char*);
+
+  const std::shared_ptr<const CommittedScene> scene_;
+  RenderSettings settings_;
+
+  mutable std::mutex control_;  // start, cancel, edit, update: one at a time
+  int edits_ = 0;
+  bool restart_after_edit_ = false;
+  std::thread thread_;
+  std::unique_ptr<Denoiser> denoiser_;  // of the thread alone; kept, because its first use is slow
+  std::string denoiser_made_for_;
+  std::atomic<bool> stop_{false}, paused_{false};
+  std::atomic<uint64_t> samples_done_{0};
+
+  mutable std::mutex mutex_;  // all below
+  mutable std::condition_variable changed_;
+  SessionState state_ = SessionState::kIdle;
+  std::exception_ptr failure_;
+  std::string failure_text_, stage_;
+  std::shared_ptr<Film> film_;
+  std::shared_ptr<const Image> shown_;  // null: read the film
+  uint32_t film_step_ = 1;
+  uint64_t generation_ = 0;
+  mutable uint64_t generation_at_ = 0;
+  SessionStatistics statistics_;
+  double started_ = 0.0, ended_ = 0.0;
+};
+
+}  // namespace afterglow

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the session's thread does: whole passes by the schedule, pictures for readers, the denoiser.
+#include <bit>
+#include <chrono>
+
+#include "base/errors.h"
+#include "render/session.h"
+
+namespace afterglow {
+
+namespace {
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+InstanceMask local_view_mask(const Scene& scene, const std::vector<uint32_t>& handles) {
+  InstanceMask mask(scene.instances().size() / 64 + 1, 0);
+  for (uint32_t handle : handles) {
+    const uint32_t index = scene.instance_index(handle);
+    mask[index / 64] |= uint64_t(1) << (index % 64);
+  }
+  return mask;
+}
+
+}  // namespace
+
+void Session::render_passes(const RenderSettings& settings, Renderer& renderer, Film& film) {
+  Work work{.stop = StopToken(&stop_),
+            .seed = uint64_t(settings.seed) ^ (std::bit_cast<uint64_t>(settings.frame) * 0x9e3779b97f4a7c15ull),
+            .threads = settings.threads,
+            .pause = &paused_,
+            .samples_done = &samples_done_};
+  InstanceMask shown;
+  if (settings.local_view_set) {
+    shown = local_view_mask(scene_->scene, settings.local_view);
+    work.shown = &shown;
+  }
+  double begun = now();
+  renderer.update(*scene_, work);
+  {
+    const std::lock_guard lock(mutex_);
+    statistics_.seconds["prepare"] = now() - begun;
+    stage_ = "rendering";
+  }
+  const ScheduleOptions options{settings.samples, settings.viewport, settings.time_limit > 0.0f};
+  const FilmSettings& f = film.settings();
+  bool shown_filtered = false;
+  uint32_t done = 0;
+  double in_passes = 0.0, at_last_publish = 0.0;
+  for (uint32_t index = 0; !stop_; ++index) {
+    const PassPlan plan = plan_pass(options, index, done);
+    if (!plan.count || limit_reached(in_passes, settings.time_limit, done, plan.count)) break;
+    work.pass = index;
+    begun = now();
+    const std::vector<PixelRequest> requests = pass_requests(plan, f.x0, f.y0, f.x1, f.y1);
+    renderer.render(*scene_, requests, film, work);
+    if (stop_) break;
+    if (plan.step == 1) done = plan.first + plan.count;
+    const double seconds = now() - begun;
+    in_passes += seconds;
+    BelievedError error;
+    if (plan.step == 1 && (error_is_due(done) || (done >= 2 && done >= settings.samples)))
+      error = film.believed_error();
+    {
+      const std::lock_guard lock(mutex_);
+      film_step_ = plan.step;
+      statistics_.samples = done;
+      if (error.value >= 0.0f) statistics_.error = error;
+      statistics_.seconds["render"] = in_passes;
+      for (const auto& [name, value] : renderer.statistics().values) statistics_.method_values[name] = value;
+      if (statistics_.passes.size() < 4096) statistics_.passes.push_back({plan.first, plan.count, plan.step, seconds});
+    }
+    const bool last = !plan_pass(options, index + 1, done).count;
+    if (settings.viewport) {
+      const bool filter_now = settings.denoise && plan.step == 1 && (std::has_single_bit(done) || last);
+      if (filter_now) {
+        publish(settings, film, 1, true);
+        shown_filtered = true;
+      } else if (!shown_filtered && (index <= kCoarsePasses || last || now() - at_last_publish > 0.05)) {
+        publish(settings, film, plan.step, false);
+        at_last_publish = now();
+      }
+    }
+    if (settings.accuracy > 0.0f && error.value >= 0.0f && error.value <= settings.accuracy) break;
+  }
+  if (!stop_ && settings.denoise && done && !settings.viewport) publish(settings, film, 1, true);
+  if (!stop_ && settings.viewport && !shown_filtered && done) publish(settings, film, 1, false);
+}
+
+/// Puts a picture where readers find it: the film's as it is, or filtered.
+void Session::publish(const RenderSettings& settings, const Film& film, uint32_t step, bool filtered) {
+  auto image = std::make_shared<Image>();
+  image->width = film.width(), image->height = film.height();
+  image->rgba.resize(size_t(image->width) * image->height * 4);
+  film.read(Pass::kCombined, image->rgba.data(), step);
+  if (filtered && !filter(settings, film, *image) && !settings.viewport) return;
+  if (stop_) return;
+  const std::lock_guard lock(mutex_);
+  shown_ = std::move(image);
+  generation_++;
+}
+
+bool Session::filter(const RenderSettings& settings, const Film& film, Image& image) {
+  set_stage("denoising");
+  const double begun = now();
+  const size_t pixels = size_t(image.width) * image.height;
+  std::vector<float> color(pixels * 3), albedo(pixels * 3), normal(pixels * 3);
+  for (size_t p = 0; p < pixels; ++p)
+    for (size_t c = 0; c < 3; ++c) color[p * 3 + c] = image.rgba[p * 4 + c];
+  film.read(Pass::kAlbedo, albedo.data());
+  film.read(Pass::kDenoiseNormal, normal.data());
+  DenoiseInput input;
+  input.color = color.data(), input.albedo = albedo.data(), input.normal = normal.data();
+  input.width = image.width, input.height = image.height;
+  input.fast = settings.viewport;
+  input.stop = StopToken(&stop_);
+  try {
+    if (!denoiser_ || denoiser_made_for_ != settings.denoiser)
+      denoiser_ = make_denoiser(settings.denoiser, settings.denoiser_search);
+    denoiser_made_for_ = settings.denoiser;
+    denoiser_->filter(input, color.data());
+  } catch (const Cancelled&) {
+    return false;
+  } catch (const Error& reason) {
+    warn(std::string("not denoised: ") + reason.what());
+    return false;
+  }
+  for (size_t p = 0; p < pixels; ++p)
+    for (size_t c = 0; c < 3; ++c) image.rgba[p * 4 + c] = std::fmax(0.0f, color[p * 3 + c]);
+  const std::lock_guard lock(mutex_);
+  statistics_.seconds["denoise"] += now() - begun;
+  statistics_.denoiser = settings.denoiser;
+  stage_ = "rendering";
+  return true;
+}
+
+}  // namespace afterglow

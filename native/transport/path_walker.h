@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The walk of a camera path: at every vertex light is looked for (next-event estimation) and run into, both weighted
+// against each other (Veach 1995), and a visitor is told. What a scene cannot show is not in the compiled kernel.
+//
+// A visitor has
+//   bool surface(const PathState&, const SurfacePoint&, const Surface&)   a vertex; false ends the walk here
+//   void lit(const PathState&, const BsdfValue&, const Rgb& light)        light found: throughput × value × light
+//   arrives void scattered(const PathState&, const BsdfSample&)                   before the throughput takes the
+//   sample's weight void emitted(const PathState&, const Rgb& light)                      light run into, weighted;
+//   throughput not applied void escaped(const PathState&, const Rgb& light)                      the same of the world,
+//   and of nothing at all void held_out(const PathState&, float share)                          a holdout seen from the
+//   camera
+#pragma once
+
+#include "base/cancel.h"
+#include "base/sampler.h"
+#include "transport/committed_scene.h"
+#include "transport/path_state.h"
+
+namespace afterglow {
+
+/// Dimensions of the sample point: four of the camera (pixel, lens), then eight a vertex.
+inline constexpr uint32_t kCameraDimensions = 4, kVertexDimensions = 8;
+
+struct WalkScene {
+  const CommittedScene& scene;
+  WalkLimits limits;
+  const InstanceMask* shown = nullptr;  // local view; null: everything
+  bool shows(uint32_t instance) const { return !shown || ((*shown)[instance / 64] >> (instance % 64) & 1); }
+};
+
+/// Share of light that a shadow ray brings through transparent surfaces; 0 where an opaque one stands.
+Rgb transmittance(const WalkScene&, Ray, const PathContext&, RayCounts&);
+
+/// End of a shadow ray: a little before its light, which may be a surface itself.
+inline float shadow_end(const Vec3& origin, float distance) {
+  const float reach = std::fmax(std::fabs(origin.x), std::fmax(std::fabs(origin.y), std::fabs(origin.z)));
+  return std::isfinite(distance) ? std::fmax(0.0f, distance * (1.0f - 2e-5f) - 1e-6f * reach) : distance;
+}
+
+template <uint32_t kFeatures>
+class Walker {
+  static constexpr bool kLobes = kFeatures & kFeatureLobes;
+  static constexpr bool kStraight = kFeatures & kFeatureStraight;
+  static constexpr bool kShapes = kFeatures & kFeatureShapes;
+
+ public:
+  Walker(const WalkScene& walk, RayCounts& counts) : walk_(walk), scene_(walk.scene), counts_(counts) {}
+
+  template <class Visitor>
+  void walk(PathState& path, Sampler& sampler, Visitor& visitor) const {
+    counts_.camera++;
+    for (uint32_t vertex = 0;; ++vertex) {
+      Hit hit;
+      if (!closest(path, hit)) {
+        if constexpr (kShapes) run_into_shapes(path, kInfinity, visitor);
+        escape(path, visitor);
+        return;
+      }
+      if constexpr (kShapes) run_into_shapes(path, hit.t, visitor);
+      path.context.ray_length = hit.t;
+      const SurfacePoint point = point_at(path, hit);
+      Surface surface;
+      scene_.materials.shade(scene_.scene, point, path.context, surface);
+      if (!is_black(surface.emission)) visitor.emitted(path, surface.emission * emission_weight(path, point));
+      if constexpr (kStraight) {
+        if (path.context.kind & PathContext::kCamera && !hold_out(path, point, surface, visitor)) return;
+        if (path.context.transparent_depth > walk_.limits.transparent) return;
+      }
+      if (path.last) {
+        if (!kStraight || is_black(surface.transparency)) return;
+        surface.count = 0;
+      }
+      sampler.set_dimension(kCameraDimensions + vertex * kVertexDimensions);
+      const float u_light = sampler.next1(), u_end = sampler.next1();
+      const Vec2 u_emitter = sampler.next2();
+      const float p = survival(path.throughput, path.context.depth, kStraight ? path.context.transparent_depth : 0);
+      if (p < 1.0f) {
+        if (!(u_end < p)) return;
+        path.throughput /= p;
+      }
+      if (!visitor.surface(path, point, surface)) return;
+      const float straight = kStraight ? straight_probability(surface) : 0.0f;
+      if (surface.count && straight < 1.0f)
+        look_for_light(path, point, surface, 1.0f - straight, u_light, u_emitter, visitor);
+      const float u_lobe = sampler.next1(), u_straight = sampler.next1();
+      const Vec2 u = sampler.next2();
+      if constexpr (kStraight) {
+        if (straight > 0.0f && u_straight < straight) {
+          pass_straight(path, point, surface.transparency / straight);
+          continue;
+        }
+      }
+      if (!surface.count || !scatter(path, point, surface, 1.0f - straight, u_lobe, u, visitor)) return;
+      counts_.bounce++;
+    }
+  }
+
+ private:
+  bool closest(PathState& path, Hit& hit) const {
+    if constexpr (kStraight) {
+      for (int skipped = 0; skipped < 4096; ++skipped) {
+        if (!scene_.rays.closest(path.ray, hit)) return false;
+        if (walk_.shows(hit.instance)) return true;
+        path.ray.origin = offset_origin(point_at(path, hit), path.ray.direction);
+        hit = Hit{};
+      }
+      return false;
+    } else {
+      return scene_.rays.closest(path.ray, hit);
+    }
+  }
+
+  SurfacePoint point_at(const PathState& path, const Hit& hit) const {
+    const InstanceRecord& instance = scene_.scene.instances()[hit.instance];
+    (void)instance;
+    return surface_point(scene_.scene, path.ray, hit, scene_.effects.has(kTextures));
+  }
+
+  float emission_weight(const PathState& path, const SurfacePoint& point) const {
+    if (!(path.density > 0.0f) || !scene_.materials.emits(point.material)) return 1.0f;
+    return power_heuristic(path.density, scene_.lights.density_of_triangle(path.position, path.light_normal, point));
+  }
+
+  template <class Visitor>
+  void run_into_shapes(const PathState& path, float t_max, Visitor& visitor) const {
+    if (!scene_.lights.has_shapes()) return;
+    Ray ray = path.ray;
+    ray.t_max = t_max;
+    const uint32_t mask = visibility_of(path.context.kind);
+    LightHit hit;
+    for (int i = 0; i < 256 && scene_.lights.intersect(ray, hit); ++i) {
+      if (hit.visibility & mask) {
+        const float other = path.density > 0.0f ? scene_.lights.density_of_light(path.position, path.light_normal,
+                                                                                 path.ray.direction, hit)
+                                                : 0.0f;
+        visitor.emitted(path, hit.radiance * (other > 0.0f ? power_heuristic(path.density, other) : 1.0f));
+      }
+      ray.t_min = std::nextafter(hit.t * (1.0f + 1e-6f), kInfinity);
+      hit = LightHit{};
+    }
+  }
+
+  template <class Visitor>
+  void escape(PathState& path, Visitor& visitor) const {
+    Rgb light{0.0f};
+    const uint32_t mask = visibility_of(path.context.kind);
+    path.context.ray_length = kInfinity;
+    if (scene_.materials.has_world() && (scene_.scene.world().visibility & mask)) {
+      light = scene_.materials.world(path.ray.direction, path.context);
+      if (path.density > 0.0f && !is_black(light))
+        light *= power_heuristic(path.density,
+                                 scene_.lights.density_of_world(path.position, path.light_normal, path.ray.direction));
+    }
+    visitor.escaped(path, light);
+    if constexpr (kShapes) {
+      for (uint32_t i = 0, n = scene_.lights.sun_count(); i < n; ++i) {
+        float density = 0.0f;
+        const Rgb sun =
+            scene_.lights.escaped_suns(path.ray.direction, mask, i, density, path.position, path.light_normal);
+        if (!is_black(sun))
+          visitor.emitted(path, sun * (path.density > 0.0f ? power_heuristic(path.density, density) : 1.0f));
+      }
+    }
+  }
+
+  /// A holdout cuts a hole into the picture: what it covers is neither seen nor lit. False: nothing is left.
+  template <class Visitor>
+  bool hold_out(PathState& path, const SurfacePoint& point, Surface& surface, Visitor& visitor) const {
+    float share = surface.holdout;
+    if (scene_.scene.instances()[point.instance].holdout) {
+      share = 1.0f - (surface.transparency.x + surface.transparency.y + surface.transparency.z) / 3.0f;
+      surface.count = 0;
+      if (share > 0.0f) visitor.held_out(path, share);
+      return !is_black(surface.transparency);
+    }
+    if (share > 0.0f) visitor.held_out(path, share);
+    return share < 1.0f;
+  }
+
+  static float straight_probability(const Surface& surface) {
+    if (is_black(surface.transparency)) return 0.0f;
+    Rgb scattered{0.0f};
+    for (int i = 0; i < surface.count; ++i) scattered += surface.lobes[i].weight;
+    const float through = surface.transparency.x + surface.transparency.y + surface.transparency.z;
+    const float rest = scattered.x + scattered.y + scattered.z;
+    return surface.count && rest > 0.0f ? through / (through + rest) : 1.0f;
+  }
+
+  void pass_straight(PathState& path, const SurfacePoint& point, const Rgb& weight) const {
+    path.throughput *= weight;
+    path.context.transparent_depth++;
+    path.ray.origin = offset_origin(point, path.ray.direction);
+    path.ray.t_min = 0.0f;
+  }
+
+  template <class Visitor>
+  void look_for_light(const PathState& path, const SurfacePoint& point, const Surface& surface, float scatter_share,
+                      float u_light, const Vec2& u, Visitor& visitor) const {
+    LightSample light;
+    if (!scene_.lights.sample(point.position, light_normal(point, surface), u_light, u, light)) return;
+    if (!(light.density > 0.0f) || is_black(light.radiance)) return;
+    BsdfValue value = evaluate<!kLobes>(surface, point.face_normal, point.outgoing, light.direction);
+    if constexpr (kShapes || kStraight) {
+      if ((light.visibility & kVisibleAll) != kVisibleAll) {
+        if (!(light.visibility & kVisibleDiffuse)) value.diffuse = Rgb(0.0f);
+        if (!(light.visibility & kVisibleGlossy)) value.glossy = Rgb(0.0f);
+        if (!(light.visibility & kVisibleTransmission)) value.transmission = Rgb(0.0f);
+      }
+    }
+    if (is_black(value.total())) return;
+    const float weight = light.delta ? 1.0f : power_heuristic(light.density, value.density * scatter_share);
+    Rgb arriving = light.radiance * (weight / light.density);
+    if (light.cast_shadow) {
+      Ray ray;
+      ray.origin = offset_origin(point, light.direction);
+      ray.direction = light.direction;
+      ray.t_max = shadow_end(ray.origin, light.distance);
+      ray.mask = kVisibleShadow;
+      counts_.shadow++;
+      if constexpr (kStraight) {
+        arriving *= transmittance(walk_, ray, path.context, counts_);
+        if (is_black(arriving)) return;
+      } else {
+        if (scene_.rays.occluded(ray)) return;
+      }
+    }
+    visitor.lit(path, value, arriving);
+  }
+
+  static Vec3 light_normal(const SurfacePoint& point, const Surface& surface) {
+    if constexpr (kLobes) {
+      if (surface.effects & kTransmission) return Vec3(0.0f);
+    }
+    return point.normal;
+  }
+
+  template <class Visitor>
+  bool scatter(PathState& path, const SurfacePoint& point, const Surface& surface, float share, float u_lobe,
+               const Vec2& u, Visitor& visitor) const {
+    const BsdfSample s = sample<!kLobes>(surface, point.face_normal, point.outgoing, u_lobe, u);
+    if (!s.valid || !(s.value.density > 0.0f)) return false;
+    visitor.scattered(path, s);
+    path.throughput *= s.value.total() / (s.value.density * share);
+    if (is_black(path.throughput)) return false;
+    path.density = s.delta ? 0.0f : s.value.density * share;
+    path.position = point.position;
+    path.light_normal = light_normal(point, surface);
+    path.ray.origin = offset_origin(point, s.direction);
+    path.ray.direction = s.direction;
+    path.ray.t_min = 0.0f;
+    path.ray.t_max = kInfinity;
+    path.last = count_bounce(path.context, walk_.limits, s.pass, s.transmitted, s.delta);
+    path.ray.mask = visibility_of(path.context.kind);
+    return true;
+  }
+
+  const WalkScene& walk_;
+  const CommittedScene& scene_;
+  RayCounts& counts_;
+};
+
+}  // namespace afterglow
