@@ -6,6 +6,7 @@ blender -b --factory-startup --python-exit-code 1 --python blend_files/make.py [
 Written by Blender 3.4 so that every later version opens them; compressed and without user interface, each below 300 KB.
 """
 
+import os
 import pathlib
 import sys
 
@@ -13,6 +14,7 @@ import bpy
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "python"))
+os.environ["AFTERGLOW_WITHOUT_MODULE"] = "1"
 
 from afterglow import scenes  # noqa: E402
 from afterglow.scenes import blender  # noqa: E402

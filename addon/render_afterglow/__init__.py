@@ -16,7 +16,9 @@ bl_info = {
     "category": "Render",
 }
 
-if "bpy" in locals():  # Reloaded by "Reload Scripts": forget the modules of before, so that the next import reads them anew.
+if (
+    "bpy" in locals()
+):  # Reloaded by "Reload Scripts": forget the modules of before, so that the next import reads them anew.
     import sys
 
     for _name in [name for name in sys.modules if name.startswith(__package__ + ".") and not name.endswith(".library")]:

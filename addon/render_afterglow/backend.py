@@ -13,13 +13,24 @@ afterglow: Any = None
 problem = ""
 
 try:
-    from .library import afterglow  # type: ignore[no-redef]
-except Exception as error:  # Whatever stops the native module from loading is told to the user, not to the console alone.
+    from .library import afterglow as _package
+
+    if not hasattr(_package, "Session"):
+        raise ImportError(f"the package at {_package.__file__} has no native module")
+    afterglow = _package
+except (
+    Exception
+) as error:  # Whatever stops the native module from loading is told to the user, not to the console alone.
     problem = f"The native module of Afterglow could not be loaded: {error}"
     print("Afterglow:", problem)
 
 _FALLBACK_METHODS: list[dict[str, Any]] = [
-    {"id": "PATH_TRACING", "label": "Path Tracing", "description": "Follow the light of every pixel anew", "settings": []}
+    {
+        "id": "PATH_TRACING",
+        "label": "Path Tracing",
+        "description": "Follow the light of every pixel anew",
+        "settings": [],
+    }
 ]
 
 

@@ -15,8 +15,8 @@ _flat_rectangles: bool | None = None
 
 
 def write_pass(render_pass: bpy.types.RenderPass, pixels: np.ndarray) -> None:
-    """Copies (height, width, channels) pixels into a pass. Blender before 4.0 wants (pixels, channels), later ones a flat
-    array; which of them is found out once."""
+    """Copies (height, width, channels) pixels into a pass. Blender before 4.0 wants (pixels, channels), later ones a
+    flat array; which of them is found out once."""
     global _flat_rectangles
     channels = render_pass.channels
     if pixels.ndim == 2:
@@ -58,8 +58,8 @@ class Picture:
         self._texture = gpu.types.GPUTexture((self.width, self.height), format="RGBA16F", data=self._buffer)
 
     def draw(self, x: float, y: float, width: float, height: float) -> None:
-        """Draws the picture over a rectangle of the region, in pixels. Values are scene-linear: Blender's viewport turns
-        them into display values afterwards."""
+        """Draws the picture over a rectangle of the region, in pixels. Values are scene-linear: Blender's viewport
+        turns them into display values afterwards."""
         if self._texture is None:
             return
         import gpu

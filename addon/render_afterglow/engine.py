@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The render engine as Blender sees it: it hands final renders to `final.py` and viewports to `viewport.py`.
 
-Blender makes a new object of this class for every mode switch and every frame; nothing that must outlive one lives here.
+Blender makes a new object of this class for every mode switch and every frame; nothing that must outlive one lives
+here.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class AfterglowRenderEngine(bpy.types.RenderEngine):
         if viewport is not None:
             viewport.free()
 
-    # Final renders and previews ------------------------------------------------------------------------------------------
+    # Final renders and previews -------------------------------------------------------------------------------------
 
     def update(self, data: bpy.types.BlendData, depsgraph: bpy.types.Depsgraph) -> None:
         self.update_stats("", "Preparing")
@@ -46,7 +47,7 @@ class AfterglowRenderEngine(bpy.types.RenderEngine):
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
         passes.register_passes(self, scene, renderlayer)
 
-    # Viewport ------------------------------------------------------------------------------------------------------------
+    # Viewport -------------------------------------------------------------------------------------------------------
 
     def view_update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         from . import viewport

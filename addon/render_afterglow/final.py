@@ -22,10 +22,17 @@ POLL_SECONDS = 0.02  # how often the user's wish to cancel is looked at
 STATUS_SECONDS = 0.25  # how often progress is told
 SHOW_SECONDS = 1.0  # how often the unfinished image is shown, at first; later more rarely
 
-PREVIEW_SETTINGS = {"method": "PATH_TRACING", "samples": 96, "accuracy": 0.03, "time_limit": 0.0, "denoise": False, "seed": 0}
+PREVIEW_SETTINGS = {
+    "method": "PATH_TRACING",
+    "samples": 96,
+    "accuracy": 0.03,
+    "time_limit": 0.0,
+    "denoise": False,
+    "seed": 0,
+}
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """What Afterglow does not do; the text goes to the user as it is."""
 
 
@@ -55,7 +62,9 @@ def render(engine: bpy.types.RenderEngine, depsgraph: bpy.types.Depsgraph) -> No
         refuse(engine, scene)
         render_layer(engine, depsgraph, scene, layer)
     except Exception as error:
-        if not isinstance(error, Refused) and not isinstance(error, getattr(backend.afterglow, "Error", Refused)):
+        if not isinstance(error, RefusedError) and not isinstance(
+            error, getattr(backend.afterglow, "Error", RefusedError)
+        ):
             traceback.print_exc()
         engine.error_set(f"Afterglow: {error}")
         store.forget(scene)
@@ -66,11 +75,11 @@ def render(engine: bpy.types.RenderEngine, depsgraph: bpy.types.Depsgraph) -> No
 
 
 def refuse(engine: bpy.types.RenderEngine, scene: bpy.types.Scene) -> None:
-    """Raises Refused for what cannot be rendered at all."""
+    """Raises RefusedError for what cannot be rendered at all."""
     if backend.afterglow is None:
-        raise Refused(backend.problem)
+        raise RefusedError(backend.problem)
     if scene.render.use_multiview and not engine.is_preview:
-        raise Refused("stereoscopic images are not supported; switch off Stereoscopy in the output properties")
+        raise RefusedError("stereoscopic images are not supported; switch off Stereoscopy in the output properties")
 
 
 def render_layer(
@@ -89,7 +98,7 @@ def render_layer(
     report = native.sync.sync(depsgraph)
     view = sync_camera_final(engine, depsgraph)
     if view is None:
-        raise Refused(f"the scene '{scene.name}' has no camera: add one, or make one the scene's camera")
+        raise RefusedError(f"the scene '{scene.name}' has no camera: add one, or make one the scene's camera")
     native.scene.set_camera(**view.camera)
     seconds = {"sync": time.perf_counter() - started}
     if engine.test_break():
@@ -105,7 +114,10 @@ def render_layer(
     if engine.is_preview:
         settings.update(PREVIEW_SETTINGS)
     settings.update(
-        width=view.width, height=view.height, region=view.region, passes=[item.native for item in wanted],
+        width=view.width,
+        height=view.height,
+        region=view.region,
+        passes=[item.native for item in wanted],
         mist=mist_settings(scene),
     )
     session = backend.afterglow.Session(native.scene, settings)
@@ -138,11 +150,15 @@ def mist_settings(scene: bpy.types.Scene) -> tuple[float, float, str]:
 
 
 def run(
-    engine: bpy.types.RenderEngine, session: Any, wanted: list[passes.Pass], region: tuple[int, int, int, int], layer: str,
+    engine: bpy.types.RenderEngine,
+    session: Any,
+    wanted: list[passes.Pass],
+    region: tuple[int, int, int, int],
+    layer: str,
     prefix: str,
 ) -> tuple[bool, dict[str, np.ndarray]]:
-    """Runs the session to its end, showing what is there. Returns whether the user cancelled (what was rendered is kept)
-    and the passes by Blender's names."""
+    """Runs the session to its end, showing what is there. Returns whether the user cancelled (what was rendered is
+    kept) and the passes by Blender's names."""
     x0, y0, x1, y1 = region
     for item in wanted[1:]:
         engine.add_pass(item.name, len(item.channels), item.channels, layer=layer)
@@ -183,7 +199,6 @@ def run(
     return cancelled, images
 
 
-
 def write(result: Any, layer: str, session: Any, wanted: list[passes.Pass]) -> dict[str, np.ndarray]:
     """Copies the wanted passes into Blender's result; gives them back by Blender's name."""
     images: dict[str, np.ndarray] = {}
@@ -217,11 +232,17 @@ def clock(seconds: float) -> str:
 
 
 def stamp(result: Any, layer: str, statistics: dict[str, Any]) -> None:
-    """Writes what the render did into the image's metadata, as `afterglow.<layer>.<name>`; `result` is the whole frame's."""
+    """Writes what the render did into the image's metadata, as `afterglow.<layer>.<name>`; `result` is the whole
+    frame's."""
     if not hasattr(result, "stamp_data_add_field"):
         return
-    fields = {"method": statistics.get("method"), "samples": statistics.get("samples"), "threads": statistics.get("threads"),
-              "dropped": statistics.get("dropped"), "denoiser": statistics.get("denoiser")}
+    fields = {
+        "method": statistics.get("method"),
+        "samples": statistics.get("samples"),
+        "threads": statistics.get("threads"),
+        "dropped": statistics.get("dropped"),
+        "denoiser": statistics.get("denoiser"),
+    }
     error = statistics.get("believed_error")
     if error is not None:
         fields["believed_error"] = f"{error:.6f}"
@@ -239,12 +260,16 @@ def stamp(result: Any, layer: str, statistics: dict[str, Any]) -> None:
 
 
 def restore_last_image(engine: bpy.types.RenderEngine, scene: bpy.types.Scene, layer: str) -> None:
-    """After a failure: the last good image comes back into the result where it has the same size, else an empty one. There
-    must be one: Blender 3.4 to 5.0 crash when they write an OpenEXR file of a result without a picture. Never another
-    frame's picture in an animation, whose files must not lie."""
+    """After a failure: the last good image comes back into the result where it has the same size, else an empty one.
+    There must be one: Blender 3.4 to 5.0 crash when they write an OpenEXR file of a result without a picture. Never
+    another frame's picture in an animation, whose files must not lie."""
     width, height = result_size(engine, scene)
     images = store.last_image(scene, layer) or {}
-    if engine.is_preview or engine.is_animation or any(pixels.shape[:2] != (height, width) for pixels in images.values()):
+    if (
+        engine.is_preview
+        or engine.is_animation
+        or any(pixels.shape[:2] != (height, width) for pixels in images.values())
+    ):
         images = {}
     known = {item.name: item for item in passes.PASSES}
     for name in images:
@@ -263,6 +288,8 @@ def result_size(engine: bpy.types.RenderEngine, scene: bpy.types.Scene) -> tuple
     """Width and height of the rectangle that Blender wants, by the same arithmetic."""
     width, height, render = engine.resolution_x, engine.resolution_y, scene.render
     if render.use_border and not engine.is_preview:
-        return (max(1, int(render.border_max_x * width) - int(render.border_min_x * width)),
-                max(1, int(render.border_max_y * height) - int(render.border_min_y * height)))
+        return (
+            max(1, int(render.border_max_x * width) - int(render.border_min_x * width)),
+            max(1, int(render.border_max_y * height) - int(render.border_min_y * height)),
+        )
     return width, height

@@ -20,8 +20,10 @@ def _find() -> ModuleType:
     beside = Path(__file__).resolve().parent / "lib"
     folder = named if named and (Path(named) / "afterglow").is_dir() else str(beside) if beside.is_dir() else ""
     if named and folder != named:
-        raise ImportError(f"AFTERGLOW_LIBRARY names '{named}', which holds no folder 'afterglow': run `make build`, "
-                          "or unset the variable")
+        raise ImportError(
+            f"AFTERGLOW_LIBRARY names '{named}', which holds no folder 'afterglow': run `make build`, "
+            "or unset the variable"
+        )
     if folder and folder not in sys.path:
         sys.path.insert(0, folder)
     try:
@@ -29,8 +31,10 @@ def _find() -> ModuleType:
     except ModuleNotFoundError as missing:
         if missing.name != "afterglow":
             raise
-        raise ImportError("Afterglow's native part is not installed with this add-on: install the zip made for this "
-                          "Blender (see the README), or start Blender through build/blender") from missing
+        raise ImportError(
+            "Afterglow's native part is not installed with this add-on: install the zip made for this "
+            "Blender (see the README), or start Blender through build/blender"
+        ) from missing
 
 
 afterglow = _find()

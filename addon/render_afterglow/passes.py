@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Render passes: what Blender calls them, what the native session calls them, and which of them a view layer asks for.
 
-Names are those of the running Blender's Cycles, so that compositor set-ups keep working; Cycles renamed its passes in 5.0.
+Names are those of the running Blender's Cycles, so that compositor set-ups keep working; Cycles renamed its passes in
+5.0.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ PASSES = (
     Pass("glossy_indirect", "GlossInd", "Glossy Indirect", "RGB", "COLOR", "use_pass_glossy_indirect"),
     Pass("glossy_color", "GlossCol", "Glossy Color", "RGB", "COLOR", "use_pass_glossy_color"),
     Pass("transmission_direct", "TransDir", "Transmission Direct", "RGB", "COLOR", "use_pass_transmission_direct"),
-    Pass("transmission_indirect", "TransInd", "Transmission Indirect", "RGB", "COLOR", "use_pass_transmission_indirect"),
+    Pass(
+        "transmission_indirect", "TransInd", "Transmission Indirect", "RGB", "COLOR", "use_pass_transmission_indirect"
+    ),
     Pass("transmission_color", "TransCol", "Transmission Color", "RGB", "COLOR", "use_pass_transmission_color"),
     Pass("emission", "Emit", "Emission", "RGB", "COLOR", "use_pass_emit"),
     Pass("environment", "Env", "Environment", "RGB", "COLOR", "use_pass_environment"),

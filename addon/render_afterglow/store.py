@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What outlives a RenderEngine object, keyed by scene: Blender makes a new engine object for every frame and mode switch.
+"""What outlives a RenderEngine object, keyed by scene: Blender makes a new engine object for every frame and mode
+switch.
 
 Native scenes of final renders stay here between the frames of an animation when "Persistent Data" is on; statistics and
 the last good image of each layer stay until another file is opened.
@@ -71,7 +72,7 @@ def last_image(scene: bpy.types.Scene, layer: str) -> dict[str, np.ndarray] | No
 def clear() -> None:
     _kept.clear()
     _statistics.clear()
-    forget_records = getattr(backend.afterglow, "clear_statistics", None)
+    forget_records = getattr(backend.afterglow, "forget_statistics", None)
     if forget_records is not None:
         forget_records()
     _last_good.clear()

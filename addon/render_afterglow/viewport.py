@@ -25,8 +25,8 @@ REDRAW_SECONDS = 0.05  # between two redraws of a picture that refines slowly, a
 
 
 class Watcher(threading.Thread):
-    """Asks Blender for a redraw whenever the session has a newer picture. Holds the engine weakly: Blender frees it when it
-    likes."""
+    """Asks Blender for a redraw whenever the session has a newer picture. Holds the engine weakly: Blender frees it
+    when it likes."""
 
     def __init__(self, engine: bpy.types.RenderEngine) -> None:
         super().__init__(name="Afterglow viewport", daemon=True)
@@ -103,9 +103,11 @@ class Viewport:
             session.cancel()
         self.native = self.picture = None
 
-    # Edits ---------------------------------------------------------------------------------------------------------------
+    # Edits ----------------------------------------------------------------------------------------------------------
 
-    def update(self, engine: bpy.types.RenderEngine, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+    def update(
+        self, engine: bpy.types.RenderEngine, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph
+    ) -> None:
         """Reads what changed in the scene."""
         if backend.afterglow is None:
             self.fail(engine, backend.problem)
@@ -136,8 +138,14 @@ class Viewport:
         scene, region, space = depsgraph.scene, context.region, context.space_data
         view = sync_camera_view(depsgraph, region, context.region_data, space, 1.0 / pixel_size(scene))
         settings = session_settings(scene, viewport=True)
-        settings.update(width=view.width, height=view.height, region=view.region, passes=["combined"],
-                        mist=mist_settings(scene), local_view=self.native.sync.local_view(space, depsgraph))
+        settings.update(
+            width=view.width,
+            height=view.height,
+            region=view.region,
+            passes=["combined"],
+            mist=mist_settings(scene),
+            local_view=self.native.sync.local_view(space),
+        )
         key = (view.camera, view.width, view.height, view.region)
         if self.session is None:
             self.native.scene.set_camera(**view.camera)
@@ -157,7 +165,7 @@ class Viewport:
                 self.watcher.wake()
         self.camera, self.settings, self.view = key, settings, view
 
-    # Drawing -------------------------------------------------------------------------------------------------------------
+    # Drawing --------------------------------------------------------------------------------------------------------
 
     def draw(self, engine: bpy.types.RenderEngine, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """Draws the newest picture; starts anew first where the view changed."""
@@ -207,8 +215,9 @@ def same_camera(one: Any, other: Any) -> bool:
     """Whether two views are equal; their transforms are arrays."""
     if one is None or other is None or one[1:] != other[1:] or one[0].keys() != other[0].keys():
         return False
-    return all((a == b).all() if hasattr(a, "all") else a == b
-               for a, b in ((one[0][name], other[0][name]) for name in one[0]))
+    return all(
+        (a == b).all() if hasattr(a, "all") else a == b for a, b in ((one[0][name], other[0][name]) for name in one[0])
+    )
 
 
 def view_status(settings: dict[str, Any], progress: dict[str, Any]) -> str:

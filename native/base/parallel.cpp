@@ -46,9 +46,12 @@ void parallel_blocks(size_t count, size_t block, unsigned threads, const std::fu
     return;
   }
   run_limited(threads, [&] {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, blocks, 1), [&](const tbb::blocked_range<size_t>& range) {
-      for (size_t b = range.begin(); b != range.end(); ++b) run(b);
-    }, tbb::simple_partitioner());
+    tbb::parallel_for(
+        tbb::blocked_range<size_t>(0, blocks, 1),
+        [&](const tbb::blocked_range<size_t>& range) {
+          for (size_t b = range.begin(); b != range.end(); ++b) run(b);
+        },
+        tbb::simple_partitioner());
   });
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The geometric facts at a hit, and where the next ray may start. Positions come from barycentric coordinates, not from
-// the ray, so that they lie on the triangle; offsets follow Wächter and Binder 2019 (Ray Tracing Gems, ch. 6).
+// the ray, so that they lie on the triangle; a bound of their rounding error goes along (after Woo et al. 1996 and
+// Pharr et al. 2023, 6.8), because a fixed offset would fit only one size of scene.
 #pragma once
 
 #include "rays/ray_caster.h"
@@ -16,6 +17,7 @@ struct SurfacePoint {
   float u = 0.0f, v = 0.0f, t = 0.0f;
   uint32_t instance = kNone, triangle = kNone;
   uint32_t material = 0;  // dense index
+  float error = 0.0f;     // how far from the true surface rounding may have put the position
   bool backfacing = false;
 };
 

@@ -134,6 +134,8 @@ SceneChanges Scene::commit() {
   s.choose_origin();
   s.place_slots();
   s.note_moves();
+  records_ = s.records;
+  slots_ = s.slots;
   SceneChanges changes = s.pending.list();
   changes.version = s.log.push(s.pending);
   s.pending = ChangeSet{};

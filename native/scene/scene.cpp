@@ -23,7 +23,10 @@ Material default_grey() {
 
 }  // namespace
 
-Scene::Scene() : state_(std::make_unique<State>()) { state_->default_material = default_grey(); }
+Scene::Scene() : state_(std::make_unique<State>()) {
+  state_->default_material = default_grey();
+  slots_ = state_->slots;
+}
 Scene::~Scene() = default;
 
 Handle Scene::add_image(Image image) {
@@ -178,8 +181,6 @@ std::vector<Handle> Scene::mesh_handles() const { return state_->meshes.handles(
 std::vector<Handle> Scene::light_handles() const { return state_->lights.handles(); }
 std::vector<Handle> Scene::image_handles() const { return state_->images.handles(); }
 
-std::span<const InstanceRecord> Scene::instances() const { return state_->records; }
-
 uint32_t Scene::instance_index(Handle handle) const {
   const uint32_t index = state_->instances.at(handle).index;
   if (index == kNone) throw InvalidHandle("instance " + std::to_string(handle) + " is not committed yet");
@@ -194,7 +195,6 @@ uint32_t Scene::material_index(Handle handle) const {
   return handle < state_->material_indices.size() ? state_->material_indices[handle] : 0;
 }
 
-std::span<const uint32_t> Scene::material_slots() const { return state_->slots; }
 DVec3 Scene::origin() const { return state_->origin; }
 Box Scene::bounds() const { return state_->bounds; }
 

@@ -70,12 +70,12 @@ class Scene {
   std::vector<Handle> light_handles() const;
   std::vector<Handle> image_handles() const;
 
-  std::span<const InstanceRecord> instances() const;
+  std::span<const InstanceRecord> instances() const { return records_; }
   uint32_t instance_index(Handle) const;
   /// Dense index → material handle; index 0 is the default grey that stands for missing materials.
   std::span<const Handle> material_handles() const;
   uint32_t material_index(Handle) const;
-  std::span<const uint32_t> material_slots() const;
+  std::span<const uint32_t> material_slots() const { return slots_; }
   /// World position that kernels' coordinates are relative to: 0 unless the scene is far from it.
   DVec3 origin() const;
   Box bounds() const;  // of all instances, relative to origin()
@@ -84,6 +84,8 @@ class Scene {
  private:
   struct State;
   std::unique_ptr<State> state_;
+  std::span<const InstanceRecord> records_;  // asked at every hit, so not through a call
+  std::span<const uint32_t> slots_;
 };
 
 }  // namespace afterglow

@@ -23,9 +23,7 @@ class Table {
     at(handle);
     rows_[handle - 1].reset();
   }
-  Row* find(Handle handle) const {
-    return handle >= 1 && handle <= rows_.size() ? rows_[handle - 1].get() : nullptr;
-  }
+  Row* find(Handle handle) const { return handle >= 1 && handle <= rows_.size() ? rows_[handle - 1].get() : nullptr; }
   Row& at(Handle handle) const {
     if (Row* row = find(handle)) return *row;
     throw InvalidHandle(std::string("no ") + kind_ + " has the handle " + std::to_string(handle));
@@ -53,8 +51,8 @@ struct MeshRow {
 struct InstanceRow {
   Instance instance;
   uint32_t index = kNone;
-  bool placed = false;         // its record can be rendered
-  DMat4 committed{1.0};        // transform at the last commit
+  bool placed = false;   // its record can be rendered
+  DMat4 committed{1.0};  // transform at the last commit
   bool moved = false;
 };
 

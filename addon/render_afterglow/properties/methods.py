@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of the methods, made from what each method says about itself: a new method brings no code here.
 
-A description is a dictionary (`afterglow.method_descriptions`): id, label, description, settings. The numbers of the enum
-items are explicit, because Blender stores numbers in its files.
+A description is a dictionary (`afterglow.method_descriptions`): id, label, description, settings. The numbers of the
+enum items are explicit, because Blender stores numbers in its files.
 """
 
 import zlib
@@ -26,7 +26,12 @@ def method_number(identifier: str) -> int:
 def method_items() -> list[tuple[str, str, str, int]]:
     """Items of `scene.afterglow.method`: the choice by the engine first, then every method."""
     items = [
-        ("AUTO", "Automatic", "Let the engine choose the method that reaches the accuracy soonest", method_number("AUTO"))
+        (
+            "AUTO",
+            "Automatic",
+            "Let the engine choose the method that reaches the accuracy soonest",
+            method_number("AUTO"),
+        )
     ]
     for method in backend.method_descriptions():
         if method["id"] != "AUTO":
@@ -41,8 +46,10 @@ def make_property(setting: dict[str, Any]) -> Any:
     if kind == "bool":
         return bpy.props.BoolProperty(default=bool(setting["default"]), **common)
     if kind in ("enum", "choice"):
-        items = [item if isinstance(item, (tuple, list)) else (item, str(item).replace("_", " ").title(), "")
-                 for item in setting.get("items", setting.get("choices", ()))]
+        items = [
+            item if isinstance(item, (tuple, list)) else (item, str(item).replace("_", " ").title(), "")
+            for item in setting.get("items", setting.get("choices", ()))
+        ]
         numbered = [(*item[:3], zlib.crc32(item[0].encode()) & 0x3FFFFFFF) for item in items]
         return bpy.props.EnumProperty(items=numbered, default=setting["default"], **common)
     for bound in ("min", "max"):
@@ -51,11 +58,14 @@ def make_property(setting: dict[str, Any]) -> Any:
     if kind == "int":
         return bpy.props.IntProperty(default=int(setting["default"]), **common)
     if kind == "string":
-        return bpy.props.StringProperty(default=str(setting["default"]), name=common["name"],
-                                        description=common["description"])
+        return bpy.props.StringProperty(
+            default=str(setting["default"]), name=common["name"], description=common["description"]
+        )
     blender_unit = {"s": "TIME", "m": "LENGTH", "rad": "ROTATION", "W": "POWER"}.get(unit, "NONE")
     subtype = {"fraction": "FACTOR", "rad": "ANGLE"}.get(unit, "NONE")
-    return bpy.props.FloatProperty(default=float(setting["default"]), unit=blender_unit, subtype=subtype, precision=4, **common)
+    return bpy.props.FloatProperty(
+        default=float(setting["default"]), unit=blender_unit, subtype=subtype, precision=4, **common
+    )
 
 
 def group_name(identifier: str) -> str:

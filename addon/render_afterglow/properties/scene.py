@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`scene.afterglow`: what all methods share, and the dictionary of settings that the native session takes.
 
-Cycles' names, meanings and defaults wherever Cycles has the same setting, except that nothing is clamped by default: light
-is left out only when a user asks for it.
+Cycles' names, meanings and defaults wherever Cycles has the same setting, except that nothing is clamped by default:
+light is left out only when a user asks for it.
 """
 
 from typing import Any
@@ -22,17 +22,33 @@ PIXEL_FILTERS = [
 class AfterglowSceneSettings(bpy.types.PropertyGroup):
     accuracy: FloatProperty(
         name="Accuracy",
-        description="Relative error of the image that is accepted: rendering ends when the engine believes it is below. "
-        "0: render exactly the given number of samples",
-        default=0.05, min=0.0, max=1.0, soft_max=0.5, precision=4, step=0.1,
+        description="Relative error of the image that is accepted: rendering ends when the engine believes it is "
+        "below. 0: render exactly the given number of samples",
+        default=0.05,
+        min=0.0,
+        max=1.0,
+        soft_max=0.5,
+        precision=4,
+        step=0.1,
     )
     samples: IntProperty(
-        name="Max Samples", description="Samples of every pixel at most; exactly so many when the accuracy is 0",
-        default=1024, min=1, soft_max=16384, max=1 << 24,
+        name="Max Samples",
+        description="Samples of every pixel at most; exactly so many when the accuracy is 0",
+        default=1024,
+        min=1,
+        soft_max=16384,
+        max=1 << 24,
     )
     time_limit: FloatProperty(
-        name="Time Limit", description="Stop after this time and keep what is there; 0: no limit",
-        default=0.0, min=0.0, soft_max=3600.0, subtype="TIME", unit="TIME", precision=2, step=100,
+        name="Time Limit",
+        description="Stop after this time and keep what is there; 0: no limit",
+        default=0.0,
+        min=0.0,
+        soft_max=3600.0,
+        subtype="TIME",
+        unit="TIME",
+        precision=2,
+        step=100,
     )
     seed: IntProperty(name="Seed", description="Another seed gives another pattern of noise", default=0, min=0)
     use_animated_seed: BoolProperty(
@@ -48,13 +64,18 @@ class AfterglowSceneSettings(bpy.types.PropertyGroup):
         name="Transparent", description="Passages through transparent surfaces at most", default=8, min=0, max=1024
     )
     sample_clamp_direct: FloatProperty(
-        name="Direct Light", description="No sample of direct light counts for more than this; 0: no limit, nothing is lost",
-        default=0.0, min=0.0, soft_max=100.0,
+        name="Direct Light",
+        description="No sample of direct light counts for more than this; 0: no limit, nothing is lost",
+        default=0.0,
+        min=0.0,
+        soft_max=100.0,
     )
     sample_clamp_indirect: FloatProperty(
         name="Indirect Light",
         description="No sample of indirect light counts for more than this; 0: no limit, nothing is lost",
-        default=0.0, min=0.0, soft_max=100.0,
+        default=0.0,
+        min=0.0,
+        soft_max=100.0,
     )
     caustics_reflective: BoolProperty(
         name="Reflective", description="Light that a mirror or glossy surface throws on a diffuse one", default=True
@@ -63,30 +84,51 @@ class AfterglowSceneSettings(bpy.types.PropertyGroup):
         name="Refractive", description="Light that goes through glass on to a diffuse surface", default=True
     )
     threads: IntProperty(
-        name="Threads", description="Processor threads; 0: as Blender's own setting of threads says", default=0, min=0, max=1024
+        name="Threads",
+        description="Processor threads; 0: as Blender's own setting of threads says",
+        default=0,
+        min=0,
+        max=1024,
     )
     denoise: BoolProperty(
-        name="Denoise", description="Remove the noise that is left with OpenImageDenoise. It costs a little time and may "
-        "blur fine detail in light", default=False,
+        name="Denoise",
+        description="Remove the noise that is left with OpenImageDenoise. It costs a little time and may "
+        "blur fine detail in light",
+        default=False,
     )
     film_exposure: FloatProperty(
         name="Exposure", description="Factor on the brightness of the image", default=1.0, min=0.0, soft_max=10.0
     )
     pixel_filter_type: EnumProperty(
-        name="Filter", description="How samples count for the pixels around them", items=PIXEL_FILTERS, default="BLACKMAN_HARRIS"
+        name="Filter",
+        description="How samples count for the pixels around them",
+        items=PIXEL_FILTERS,
+        default="BLACKMAN_HARRIS",
     )
     filter_width: FloatProperty(
         name="Width", description="Width of the pixel filter", default=1.5, min=0.01, max=10.0, subtype="PIXEL"
     )
     preview_samples: IntProperty(
-        name="Max Samples", description="Samples of every pixel in the viewport at most; 0: go on for ever", default=1024, min=0,
-        soft_max=16384, max=1 << 24,
+        name="Max Samples",
+        description="Samples of every pixel in the viewport at most; 0: go on for ever",
+        default=1024,
+        min=0,
+        soft_max=16384,
+        max=1 << 24,
     )
     preview_accuracy: FloatProperty(
-        name="Accuracy", description="Relative error at which the viewport rests; 0: go on to the given number of samples",
-        default=0.02, min=0.0, max=1.0, soft_max=0.5, precision=4, step=0.1,
+        name="Accuracy",
+        description="Relative error at which the viewport rests; 0: go on to the given number of samples",
+        default=0.02,
+        min=0.0,
+        max=1.0,
+        soft_max=0.5,
+        precision=4,
+        step=0.1,
     )
-    use_preview_denoising: BoolProperty(name="Denoise", description="Denoise the viewport while it refines", default=False)
+    use_preview_denoising: BoolProperty(
+        name="Denoise", description="Denoise the viewport while it refines", default=False
+    )
     preview_pause: BoolProperty(name="Pause Viewport", description="Hold all viewports as they are", default=False)
     file_version: IntProperty(description="Version of the settings that the file holds", default=0, options={"HIDDEN"})
 
@@ -99,11 +141,27 @@ class AfterglowSceneSettings(bpy.types.PropertyGroup):
 
 
 # What a method's description may name without getting a property of its own.
-SHARED_SETTINGS = set(AfterglowSceneSettings.__annotations__) | {"method", "width", "height", "region", "frame", "passes"}
+SHARED_SETTINGS = set(AfterglowSceneSettings.__annotations__) | {
+    "method",
+    "width",
+    "height",
+    "region",
+    "frame",
+    "passes",
+}
 
 _SESSION_NAMES = (
-    "max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "transparent_max_bounces",
-    "sample_clamp_direct", "sample_clamp_indirect", "caustics_reflective", "caustics_refractive", "film_exposure", "filter_width",
+    "max_bounces",
+    "diffuse_bounces",
+    "glossy_bounces",
+    "transmission_bounces",
+    "transparent_max_bounces",
+    "sample_clamp_direct",
+    "sample_clamp_indirect",
+    "caustics_reflective",
+    "caustics_refractive",
+    "film_exposure",
+    "filter_width",
 )
 
 

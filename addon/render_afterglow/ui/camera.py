@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The camera's panel that Blender before 4.0 shows for Cycles alone: the kind of panorama. All else is Blender's own."""
+"""The camera's panel that Blender before 4.0 shows for Cycles alone: the kind of panorama. All else is Blender's
+own."""
 
 import bpy
 

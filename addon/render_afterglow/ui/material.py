@@ -30,8 +30,15 @@ class AFTERGLOW_MATERIAL_PT_context(PropertiesPanel, bpy.types.Panel):
         if thing is not None:
             several = len(thing.material_slots) > 1
             row = layout.row()
-            row.template_list("MATERIAL_UL_matslots", "", thing, "material_slots", thing, "active_material_index",
-                              rows=5 if several else 3)
+            row.template_list(
+                "MATERIAL_UL_matslots",
+                "",
+                thing,
+                "material_slots",
+                thing,
+                "active_material_index",
+                rows=5 if several else 3,
+            )
             column = row.column(align=True)
             column.operator("object.material_slot_add", icon="ADD", text="")
             column.operator("object.material_slot_remove", icon="REMOVE", text="")
@@ -49,7 +56,9 @@ class AFTERGLOW_MATERIAL_PT_context(PropertiesPanel, bpy.types.Panel):
             row = layout.row()
             row.template_ID(thing, "active_material", new="material.new")
             if slot is not None:
-                row.prop(slot, "link", text="", icon="OBJECT_DATA" if slot.link == "OBJECT" else "MESH_DATA", icon_only=True)
+                row.prop(
+                    slot, "link", text="", icon="OBJECT_DATA" if slot.link == "OBJECT" else "MESH_DATA", icon_only=True
+                )
         elif context.material is not None:
             layout.template_ID(space, "pin_id")
 
@@ -91,5 +100,8 @@ class AFTERGLOW_MATERIAL_PT_settings(MaterialPanel, bpy.types.Panel):
 
 
 classes = (
-    AFTERGLOW_MATERIAL_PT_context, AFTERGLOW_MATERIAL_PT_preview, AFTERGLOW_MATERIAL_PT_surface, AFTERGLOW_MATERIAL_PT_settings
+    AFTERGLOW_MATERIAL_PT_context,
+    AFTERGLOW_MATERIAL_PT_preview,
+    AFTERGLOW_MATERIAL_PT_surface,
+    AFTERGLOW_MATERIAL_PT_settings,
 )

@@ -36,12 +36,17 @@ def wrap(layout: bpy.types.UILayout, text: str, icon: str = "NONE", width: int =
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
 
 
-def draw_node_input(layout: bpy.types.UILayout, tree: bpy.types.NodeTree | None, kinds: tuple[str, ...], name: str) -> bool:
-    """Draws the input `name` of a node tree's active output, with the nodes behind it; False: there is no such output."""
+def draw_node_input(
+    layout: bpy.types.UILayout, tree: bpy.types.NodeTree | None, kinds: tuple[str, ...], name: str
+) -> bool:
+    """Draws the input `name` of a node tree's active output, with the nodes behind it; False: there is no such
+    output."""
     if tree is None:
         return False
     outputs = [node for node in tree.nodes if node.bl_idname in kinds]
-    active = next((node for node in outputs if getattr(node, "is_active_output", False)), outputs[0] if outputs else None)
+    active = next(
+        (node for node in outputs if getattr(node, "is_active_output", False)), outputs[0] if outputs else None
+    )
     socket = active.inputs.get(name) if active is not None else None
     if socket is None:
         return False

@@ -1,21 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panels of the render tab: method and accuracy, light paths, film, performance, denoising, what the last render did."""
+"""Panels of the render tab: method and accuracy, light paths, film, performance, denoising, what the last render
+did."""
 
 import bpy
+from bl_ui.utils import PresetPanel
 
 from .. import backend, store
+from ..operators.presets import QUALITY_ITEMS
 from ..properties import methods
 from .panel import PropertiesPanel, wrap
 
 
+class AFTERGLOW_PT_sampling_presets(PresetPanel, bpy.types.Panel):
+    bl_label = "Sampling Presets"
+    preset_subdir = "afterglow/sampling"
+    preset_operator = "script.execute_preset"
+    preset_add_operator = "afterglow.sampling_preset_add"
+    COMPAT_ENGINES = PropertiesPanel.COMPAT_ENGINES
+
+
 class AFTERGLOW_RENDER_PT_sampling(PropertiesPanel, bpy.types.Panel):
     bl_label = "Sampling"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        AFTERGLOW_PT_sampling_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.prepare(), context.scene.afterglow
         if backend.problem:
             wrap(layout, backend.problem, "ERROR")
         layout.prop(settings, "method")
+        row = layout.row(align=True)
+        for identifier, label, _description, _number in QUALITY_ITEMS:
+            row.operator("afterglow.quality", text=label).quality = identifier
+        layout.operator("afterglow.copy_cycles_settings")
 
 
 class AFTERGLOW_RENDER_PT_sampling_method(PropertiesPanel, bpy.types.Panel):
@@ -165,6 +183,7 @@ class AFTERGLOW_RENDER_PT_statistics(PropertiesPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         statistics = store.statistics(context.scene)
+        layout.operator("afterglow.copy_information")
         if statistics is None:
             layout.label(text="Nothing was rendered yet", icon="INFO")
             return
@@ -180,12 +199,16 @@ class AFTERGLOW_RENDER_PT_statistics(PropertiesPanel, bpy.types.Panel):
 
 def statistics_lines(statistics: dict) -> list[tuple[str, str]]:
     """What a render did, as rows of a name and a value."""
-    lines = [("Method", str(statistics.get("method", "")).replace("_", " ").title()),
-             ("Samples", str(statistics.get("samples", "")))]
+    lines = [
+        ("Method", str(statistics.get("method", "")).replace("_", " ").title()),
+        ("Samples", str(statistics.get("samples", ""))),
+    ]
     error = statistics.get("believed_error")
     if error is not None:
         low, high = statistics.get("error_low"), statistics.get("error_high")
-        lines.append(("Error", f"{error:.2%}" + (f" ({low:.2%} to {high:.2%})" if low is not None and high is not None else "")))
+        lines.append(
+            ("Error", f"{error:.2%}" + (f" ({low:.2%} to {high:.2%})" if low is not None and high is not None else ""))
+        )
     lines.append(("Time", f"{statistics.get('wall_time', 0.0):.2f} s"))
     for stage, seconds in (statistics.get("seconds") or {}).items():
         lines.append(("  " + stage.replace("_", " ").title(), f"{seconds:.3f} s"))
@@ -204,8 +227,17 @@ def statistics_lines(statistics: dict) -> list[tuple[str, str]]:
 
 
 classes = (
-    AFTERGLOW_RENDER_PT_sampling, AFTERGLOW_RENDER_PT_sampling_method, AFTERGLOW_RENDER_PT_sampling_render,
-    AFTERGLOW_RENDER_PT_sampling_viewport, AFTERGLOW_RENDER_PT_denoise, AFTERGLOW_RENDER_PT_light_paths,
-    AFTERGLOW_RENDER_PT_bounces, AFTERGLOW_RENDER_PT_clamping, AFTERGLOW_RENDER_PT_caustics, AFTERGLOW_RENDER_PT_film,
-    AFTERGLOW_RENDER_PT_performance, AFTERGLOW_RENDER_PT_statistics,
+    AFTERGLOW_PT_sampling_presets,
+    AFTERGLOW_RENDER_PT_sampling,
+    AFTERGLOW_RENDER_PT_sampling_method,
+    AFTERGLOW_RENDER_PT_sampling_render,
+    AFTERGLOW_RENDER_PT_sampling_viewport,
+    AFTERGLOW_RENDER_PT_denoise,
+    AFTERGLOW_RENDER_PT_light_paths,
+    AFTERGLOW_RENDER_PT_bounces,
+    AFTERGLOW_RENDER_PT_clamping,
+    AFTERGLOW_RENDER_PT_caustics,
+    AFTERGLOW_RENDER_PT_film,
+    AFTERGLOW_RENDER_PT_performance,
+    AFTERGLOW_RENDER_PT_statistics,
 )

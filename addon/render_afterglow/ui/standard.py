@@ -14,18 +14,33 @@ import bpy
 
 # Panels whose settings stand in Afterglow's own panels, or which only other engines heed.
 REPLACED = {
-    "DATA_PT_light", "DATA_PT_preview", "DATA_PT_spot", "DATA_PT_area", "DATA_PT_falloff_curve", "DATA_PT_EEVEE_light",
-    "EEVEE_MATERIAL_PT_context_material", "MATERIAL_PT_preview", "MATERIAL_PT_context_material", "NODE_DATA_PT_light",
-    "NODE_DATA_PT_spot", "OBJECT_PT_visibility", "VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes", "WORLD_PT_preview",
+    "DATA_PT_light",
+    "DATA_PT_preview",
+    "DATA_PT_spot",
+    "DATA_PT_area",
+    "DATA_PT_falloff_curve",
+    "DATA_PT_EEVEE_light",
+    "EEVEE_MATERIAL_PT_context_material",
+    "MATERIAL_PT_preview",
+    "MATERIAL_PT_context_material",
+    "NODE_DATA_PT_light",
+    "NODE_DATA_PT_spot",
+    "OBJECT_PT_visibility",
+    "VIEWLAYER_PT_filter",
+    "VIEWLAYER_PT_layer_passes",
+    "WORLD_PT_preview",
     "WORLD_PT_context_surface",
 }
 # Panels that do not name BLENDER_RENDER although what they show counts for any renderer.
 ALSO = {
-    "RENDER_PT_color_management", "RENDER_PT_color_management_curves", "RENDER_PT_color_management_display_settings",
-    "RENDER_PT_color_management_working_space", "RENDER_PT_color_management_white_balance",
+    "RENDER_PT_color_management",
+    "RENDER_PT_color_management_curves",
+    "RENDER_PT_color_management_display_settings",
+    "RENDER_PT_color_management_working_space",
+    "RENDER_PT_color_management_white_balance",
 }
-# Modules of Blender that offer shader nodes for Cycles alone: what they offer is offered here, too. What the engine does
-# not know has a stated fallback.
+# Modules of Blender that offer shader nodes for Cycles alone: what they offer is offered here, too. What the engine
+# does not know has a stated fallback.
 NODE_MENUS = ("nodeitems_builtins", "bl_ui.node_add_menu_shader")
 
 _added: set[str] = set()

@@ -59,5 +59,8 @@ class AFTERGLOW_RENDER_PT_override(ViewLayerPanel, bpy.types.Panel):
 
 
 classes = (
-    AFTERGLOW_RENDER_PT_passes, AFTERGLOW_RENDER_PT_passes_data, AFTERGLOW_RENDER_PT_passes_light, AFTERGLOW_RENDER_PT_override
+    AFTERGLOW_RENDER_PT_passes,
+    AFTERGLOW_RENDER_PT_passes_data,
+    AFTERGLOW_RENDER_PT_passes_light,
+    AFTERGLOW_RENDER_PT_override,
 )

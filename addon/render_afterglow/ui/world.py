@@ -63,5 +63,8 @@ class AFTERGLOW_WORLD_PT_ray_visibility(WorldPanel, bpy.types.Panel):
 
 
 classes = (
-    AFTERGLOW_WORLD_PT_preview, AFTERGLOW_WORLD_PT_surface, AFTERGLOW_WORLD_PT_mist, AFTERGLOW_WORLD_PT_ray_visibility
+    AFTERGLOW_WORLD_PT_preview,
+    AFTERGLOW_WORLD_PT_surface,
+    AFTERGLOW_WORLD_PT_mist,
+    AFTERGLOW_WORLD_PT_ray_visibility,
 )

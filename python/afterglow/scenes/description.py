@@ -167,7 +167,7 @@ class Description:
         grow = scale(factor)
         result = self.transformed(grow)
         for light in result.lights:
-            light.transform = grow @ light.transform @ scale(1.0 / factor)
+            light.transform = light.transform @ scale(1.0 / factor)
             light.radius *= factor
             light.size = (light.size[0] * factor, light.size[1] * factor)
             if light.kind != "sun":

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings at one click: a quality, a user's own presets, or what the file has for Cycles."""
+
+import bpy
+from bl_operators.presets import AddPresetBase
+
+# Quality → settings of the final render and of the viewport.
+QUALITIES = {
+    "DRAFT": dict(accuracy=0.2, samples=64, preview_accuracy=0.1),
+    "MEDIUM": dict(accuracy=0.05, samples=1024, preview_accuracy=0.02),
+    "HIGH": dict(accuracy=0.02, samples=8192, preview_accuracy=0.02),
+    "REFERENCE": dict(
+        accuracy=0.005, samples=1 << 20, preview_accuracy=0.01, sample_clamp_direct=0.0, sample_clamp_indirect=0.0
+    ),
+}
+QUALITY_ITEMS = [
+    ("DRAFT", "Draft", "Relative error of 20 %, 64 samples at most", 0),
+    ("MEDIUM", "Medium", "Relative error of 5 %, 1024 samples at most", 1),
+    ("HIGH", "High", "Relative error of 2 %, 8192 samples at most", 2),
+    ("REFERENCE", "Reference", "Relative error of 0.5 %, nothing clamped: slow", 3),
+]
+# Settings that Cycles has by the same name and in the same meaning.
+FROM_CYCLES = (
+    "samples",
+    "seed",
+    "use_animated_seed",
+    "max_bounces",
+    "diffuse_bounces",
+    "glossy_bounces",
+    "transmission_bounces",
+    "transparent_max_bounces",
+    "sample_clamp_direct",
+    "sample_clamp_indirect",
+    "caustics_reflective",
+    "caustics_refractive",
+    "film_exposure",
+    "pixel_filter_type",
+    "filter_width",
+    "preview_samples",
+    "use_preview_denoising",
+    "time_limit",
+)
+
+
+class AFTERGLOW_OT_quality(bpy.types.Operator):
+    bl_idname = "afterglow.quality"
+    bl_label = "Quality"
+    bl_description = "Set accuracy and samples for a quality"
+    bl_options = {"REGISTER", "UNDO"}
+
+    quality: bpy.props.EnumProperty(name="Quality", items=QUALITY_ITEMS, default="MEDIUM")
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        return next(item[2] for item in QUALITY_ITEMS if item[0] == properties.quality)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for name, value in QUALITIES[self.quality].items():
+            setattr(context.scene.afterglow, name, value)
+        return {"FINISHED"}
+
+
+class AFTERGLOW_OT_copy_cycles_settings(bpy.types.Operator):
+    bl_idname = "afterglow.copy_cycles_settings"
+    bl_label = "Copy Cycles' Settings"
+    bl_description = "Take samples, bounces, clamping, caustics and film from this scene's settings for Cycles"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return hasattr(context.scene, "cycles")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        theirs, ours = context.scene.cycles, context.scene.afterglow
+        for name in FROM_CYCLES:
+            if hasattr(theirs, name):
+                setattr(ours, name, getattr(theirs, name))
+        if getattr(theirs, "use_adaptive_sampling", False) is False:
+            ours.accuracy = 0.0
+        if not ours.poll_denoise():
+            ours.denoise = bool(getattr(theirs, "use_denoising", False))
+        return {"FINISHED"}
+
+
+class AFTERGLOW_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):
+    bl_idname = "afterglow.sampling_preset_add"
+    bl_label = "Add Sampling Preset"
+    bl_description = "Keep these settings as a preset, or remove one"
+    preset_menu = "AFTERGLOW_PT_sampling_presets"
+    preset_subdir = "afterglow/sampling"
+    preset_defines = ["settings = bpy.context.scene.afterglow"]
+    preset_values = [
+        "settings." + name
+        for name in (
+            "method",
+            "accuracy",
+            "samples",
+            "time_limit",
+            "seed",
+            "max_bounces",
+            "diffuse_bounces",
+            "glossy_bounces",
+            "transmission_bounces",
+            "transparent_max_bounces",
+            "sample_clamp_direct",
+            "sample_clamp_indirect",
+            "caustics_reflective",
+            "caustics_refractive",
+            "denoise",
+            "preview_accuracy",
+            "preview_samples",
+            "use_preview_denoising",
+        )
+    ]
+
+
+classes = (AFTERGLOW_OT_quality, AFTERGLOW_OT_copy_cycles_settings, AFTERGLOW_OT_sampling_preset_add)

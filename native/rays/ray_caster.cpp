@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The two questions that kernels ask the BVH. Building it is bvh_build.cpp's work; here is only the way of one ray
+// through Embree (Wald et al. 2014), kept as thin as it can be.
+#include "rays/ray_caster.h"
+
+#include "rays/ray_caster_state.h"
+
+namespace afterglow {
+
+namespace {
+
+/// Embree's answer to a non-finite ray is undefined; ours is: nothing is hit.
+bool usable(const Ray& ray) {
+  const Vec3 zero = ray.origin * 0.0f + ray.direction * 0.0f;
+  return zero.x + zero.y + zero.z == 0.0f && ray.t_min <= ray.t_max;
+}
+
+void fill(RTCRay& to, const Ray& ray) {
+  to.org_x = ray.origin.x;
+  to.org_y = ray.origin.y;
+  to.org_z = ray.origin.z;
+  to.tnear = ray.t_min;
+  to.dir_x = ray.direction.x;
+  to.dir_y = ray.direction.y;
+  to.dir_z = ray.direction.z;
+  to.time = 0.0f;
+  to.tfar = ray.t_max;
+  to.mask = ray.mask;
+  to.id = 0;
+  to.flags = 0;
+}
+
+}  // namespace
+
+bool RayCaster::closest(const Ray& ray, Hit& hit) const {
+  hit.instance = kNone;
+  hit.t = kInfinity;
+  if (!usable(ray)) return false;
+  RTCRayHit query;
+  fill(query.ray, ray);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  embree::closest(state_->top, query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+  hit.t = query.ray.tfar;
+  hit.u = query.hit.u;
+  hit.v = query.hit.v;
+  // An instance and a mesh that stands in the top level by itself have the same id there: the dense instance index.
+  hit.instance = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? query.hit.instID[0] : query.hit.geomID;
+  hit.triangle = query.hit.primID;
+  return true;
+}
+
+bool RayCaster::occluded(const Ray& ray) const {
+  if (!usable(ray)) return false;
+  RTCRay query;
+  fill(query, ray);
+  embree::occluded(state_->top, query);
+  return query.tfar < 0.0f;
+}
+
+}  // namespace afterglow
