@@ -225,6 +225,8 @@ bool RayCaster::State::place(const Scene& scene, const std::vector<bool>& flat, 
   return any;
 }
 
+std::string ray_library_version() { return RTC_VERSION_STRING; }
+
 RayCaster::RayCaster() : state_(std::make_unique<State>()) {}
 RayCaster::~RayCaster() = default;
 

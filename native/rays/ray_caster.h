@@ -28,6 +28,9 @@ struct Hit {
 /// Instances that one view shows (local view): one bit an instance; empty: all.
 using InstanceMask = std::vector<uint64_t>;
 
+/// Embree's version, as "3.13.5".
+std::string ray_library_version();
+
 class RayCaster {
  public:
   struct Options {
@@ -44,6 +47,7 @@ class RayCaster {
   size_t bytes() const;
 
  private:
+  friend struct RayMeasurement;
   struct State;
   std::unique_ptr<State> state_;
 };

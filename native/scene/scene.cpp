@@ -94,8 +94,8 @@ void Scene::deform_mesh(Handle handle, std::vector<Vec3> positions, std::vector<
   expect(vertex_normals.size(), mesh.positions.size(), "vertex_normals");
 
   mesh.positions.assign(positions.begin(), positions.end());  // in place: the BVH knows this address
-  mesh.corner_normals = std::move(corner_normals);
-  mesh.vertex_normals = std::move(vertex_normals);
+  if (!corner_normals.empty()) mesh.corner_normals = std::move(corner_normals);
+  if (!vertex_normals.empty()) mesh.vertex_normals = std::move(vertex_normals);
   MeshRepairs repairs = check_deformed(mesh, row.dropped);
   const bool same_triangles = repairs.dropped.empty() && row.dropped.empty();
   row.dropped = std::move(repairs.dropped);
