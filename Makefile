@@ -103,6 +103,14 @@ bench:
 	@$(MAKE) --no-print-directory build PRESET=release
 	@PYTHONPATH=$(ROOT)/build/release/python $(PYTHON) -m afterglow bench $(NAME) --output build/bench
 
+package:
+	@tools/setup.sh package
+	@$(PYTHON) tools/package.py
+
+venvs:
+	@tools/setup.sh package
+	@$(PYTHON) tools/venvs.py $(VERSIONS)
+
 format:
 	@tools/setup.sh format
 	@git ls-files '*.cpp' '*.h' | xargs -r clang-format -i

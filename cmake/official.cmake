@@ -19,4 +19,4 @@ execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=libgcc_s.so.1 OUT
 set(CMAKE_CXX_CREATE_SHARED_MODULE
   "${AFTERGLOW_ZIG} cc -target x86_64-linux-gnu.2.28 -shared -s -o <TARGET> <OBJECTS> <LINK_LIBRARIES> ${STDCXX} ${GCC_S} \
 -Wl,--version-script=${CMAKE_CURRENT_LIST_DIR}/module.map -Wl,-Bsymbolic -Wl,--allow-shlib-undefined -Wl,-z,relro -Wl,-z,now \
--Wl,--gc-sections -Wl,-rpath,\\$ORIGIN/libs")
+-Wl,--gc-sections")

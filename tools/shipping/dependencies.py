@@ -3,7 +3,8 @@
 
 Official Blender has its own Embree, TBB and OpenImageIO in the process's global scope, under the same symbol names. So
 that our calls never reach its copies and its calls never ours, every function of our Embree, and of the TBB that only
-this Embree uses, is renamed; our own TBB is linked statically and hidden; OpenImageIO's C++ names carry its version."""
+this Embree uses, is renamed; our own TBB is linked statically and hidden; OpenImageIO's C++ names carry its version. The
+TBB for Embree is our own build, too: the one in Embree's wheel comes out of a compiler whose runtime is not free."""
 
 from __future__ import annotations
 
@@ -30,7 +31,7 @@ LIBRARIES = {"embree": "libafterglow_embree4.so", "embree_tbb": "libafterglow_em
 def prepare() -> Path:
     """The folder with include/ and lib/ that CMake's AFTERGLOW_OFFICIAL names; made anew when this file or a pin changed."""
     folder = Path(__file__).parent
-    recipe = hashlib.sha256(b"".join(folder.joinpath(name).read_bytes() for name in ("dependencies.py", "downloads.py")))
+    recipe = hashlib.sha256(b"".join(folder.joinpath(name).read_bytes() for name in ("dependencies.py", "downloads.py", "stand_ins.cpp")))
     stamp = DEPS / ".recipe"
     if stamp.is_file() and stamp.read_text() == recipe.hexdigest():
         return DEPS
@@ -38,9 +39,9 @@ def prepare() -> Path:
     (DEPS / "lib").mkdir(parents=True)
     (DEPS / "include").mkdir()
     tools()
+    _tbb()
     _embree()
     _oiio()
-    _tbb()
     stamp.write_text(recipe.hexdigest())
     return DEPS
 
@@ -98,7 +99,7 @@ def needed_by(library: Path) -> list[str]:
 
 def _embree() -> None:
     embree = _from_wheel(downloads.EMBREE, r"embreex\.libs/libembree4-.*", LIBRARIES["embree"])
-    tbb = _from_wheel(downloads.EMBREE, r"embreex\.libs/libtbb-.*", LIBRARIES["embree_tbb"])
+    tbb = _shared_tbb()
     rtc = [name for name in dynamic_symbols(embree, defined=True) if name.startswith("rtc")]
     of_tbb = dynamic_symbols(tbb, defined=True)
     used = sorted(set(dynamic_symbols(embree, defined=False)) & set(of_tbb))
@@ -115,6 +116,21 @@ def _embree() -> None:
     (DEPS / "include" / "embree_renames.h").write_text(
         "// Written by tools/shipping/dependencies.py: the names under which the packaged Embree has its functions.\n"
         "#pragma once\n" + lines)
+
+
+def _shared_tbb() -> Path:
+    """oneTBB's own objects as a shared library for glibc 2.28, which is what Embree's binary asks for."""
+    _, zig = tools()
+    path, stand_ins = DEPS / "lib" / LIBRARIES["embree_tbb"], WORK / "stand_ins.o"
+    source = Path(__file__).parent / "stand_ins.cpp"
+    subprocess.run(["g++", "-std=c++20", "-O2", "-fPIC", "-fvisibility=hidden", "-c", source, "-o", stand_ins], check=True)
+    runtime = [subprocess.run(["g++", f"-print-file-name={name}"], check=True, capture_output=True, text=True).stdout.strip()
+               for name in ("libstdc++.so.6", "libgcc_s.so.1")]
+    subprocess.run([zig, "cc", "-target", "x86_64-linux-gnu.2.28", "-shared", "-s", "-o", path, "-Wl,--whole-archive",
+                    DEPS / "lib" / "libtbb.a", "-Wl,--no-whole-archive", stand_ins, *runtime,
+                    f"-Wl,--version-script={WORK / 'onetbb' / 'src' / 'tbb' / 'def' / 'lin64-tbb.def'}",
+                    "-Wl,--undefined-version", "-Wl,--allow-shlib-undefined"], check=True)
+    return path
 
 
 def _oiio() -> None:
