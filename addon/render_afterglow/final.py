@@ -41,6 +41,7 @@ class NativeScene:
 
     def __init__(self) -> None:
         self.warnings: list[str] = []
+        self.depsgraph = 0
         self.scene = backend.afterglow.Scene()
         self.sync = SceneSync(self.scene, self.log)
 
@@ -49,6 +50,13 @@ class NativeScene:
             self.warnings.append(text)
         else:
             print("Afterglow:", text)
+
+    def sync_with(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Makes the native scene equal to the depsgraph; everything is read again where it is another one than
+        before."""
+        address = depsgraph.as_pointer()
+        self.sync.sync(depsgraph, full=address != self.depsgraph)
+        self.depsgraph = address
 
     def take_warnings(self) -> list[str]:
         taken, self.warnings[:] = list(dict.fromkeys(self.warnings)), []
@@ -95,7 +103,7 @@ def render_layer(
     if persistent:
         store.keep(scene, layer, native)
 
-    report = native.sync.sync(depsgraph)
+    native.sync_with(depsgraph)
     view = sync_camera_final(engine, depsgraph)
     if view is None:
         raise RefusedError(f"the scene '{scene.name}' has no camera: add one, or make one the scene's camera")
@@ -107,7 +115,6 @@ def render_layer(
     changes = native.scene.commit()
     seconds["commit"] = time.perf_counter() - started - seconds["sync"]
     warnings = native.take_warnings() + list(view.warnings) + list(changes["warnings"])
-    del report
 
     wanted = list(passes.wanted(depsgraph.view_layer)) if not engine.is_preview else [passes.COMBINED]
     settings = session_settings(scene, viewport=False)
