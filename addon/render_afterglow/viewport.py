@@ -16,8 +16,8 @@ from typing import Any
 import bpy
 
 from . import backend, display
-from .final import NativeScene, mist_settings
-from .properties.scene import session_settings
+from .native_scene import NativeScene
+from .properties.scene import mist_settings, session_settings
 from .sync import sync_camera_view
 from .sync.scene import viewport_shading
 
