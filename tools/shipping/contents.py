@@ -101,6 +101,7 @@ OURS = (
            "the source of oneTBB (src/tbb/tools_api); https://github.com/intel/ittapi"),
     Notice("pybind11", ("2016 Wenzel Jakob and others",), "bsd_3_clause", "https://github.com/pybind/pybind11 (Debian 2.10.3-1)"),
     Notice("GLM", ("2005-present G-Truc Creation",), "mit", "https://github.com/g-truc/glm (Debian 0.9.9.8+ds-6)"),
+    Notice("Zig's compiler runtime", ("Zig contributors",), "mit", "https://codeberg.org/ziglang/zig (0.17.1)"),
     Notice("{fmt}, as far as headers of OpenImageIO bring it", ("2012-present Victor Zverovich",), "mit",
            "https://github.com/fmtlib/fmt (Debian 9.1.0+ds1-2)"),
     Notice("embreex, whose wheel Embree's library was taken from", ("2015 Anthony Scopatz",), "bsd_2_clause",
