@@ -15,18 +15,40 @@ enum class LobeKind : uint8_t {
   kLambert,
   kOrenNayar,
   kTranslucent,
+  kBurley,  // Principled's diffuse before Blender 4.0
   kSheen,
+  kSheenV1,  // Principled's sheen before Blender 4.0
   kMicrofacetReflection,
   kMicrofacetGlass,
   kMicrofacetRefraction,
 };
 
-/// One lobe. weight: throughput factor with all layering applied; the rest by kind (materials/lobes.h).
-struct Lobe {
+/// Which Fresnel term a microfacet lobe takes, and what f0 and f90 mean to it. In a glass lobe f90 is always the tint of
+/// what goes through, and the reflected end point is 1.
+enum class Fresnel : uint8_t {
+  kNone,        // 1
+  kDielectric,  // exact, unpolarised, from ior; glass: reflection tinted by f0
+  kSchlick,     // from f0 to f90 along the exact curve of ior
+  kF82,         // f0, and f90 = the factor B of the Lazanyi term
+  kConductor,   // f0 = index of refraction, f90 = extinction
+};
+
+/// Lobe::distribution: how masking and the distribution of normals are taken.
+enum class Distribution : uint8_t {
+  kGgx,           // height-correlated Smith
+  kGgxSeparable,  // masking and shadowing apart, as Blender before 4.0
+  kGtr1,          // clearcoat before 4.0
+};
+
+inline constexpr float kMirrorAlpha = 7e-4f;  // below: a delta
+
+/// One lobe. weight: throughput factor with all layering applied; the rest by kind (enums above).
+struct alignas(16) Lobe {
   LobeKind kind = LobeKind::kLambert;
   LobeClass pass = LobeClass::kDiffuse;
-  uint8_t fresnel = 0;  // which Fresnel term a microfacet lobe takes (materials/lobes.h)
-  uint8_t distribution = 0;
+  Fresnel fresnel = Fresnel::kNone;
+  Distribution distribution = Distribution::kGgx;
+  bool bumped = false;           // its normal comes from a map or a bump: diffuse light is shadowed smoothly
   float sampling_weight = 0.0f;  // relative; sums to 1 over a Surface
   Rgb weight{0.0f};
   Vec3 normal{0, 0, 1};
@@ -38,13 +60,25 @@ struct Lobe {
 };
 
 struct Surface {
-  static constexpr int kMaxLobes = 8;
+  static constexpr int kMaxLobes = 16;
   int count = 0;
   uint32_t effects = 0;  // bits of Effect that its lobes need
   Rgb emission{0.0f};
   Rgb transparency{0.0f};  // share of light that goes straight through
   float holdout = 0.0f;
-  Lobe lobes[kMaxLobes];
+  bool needs_frame = false;  // folded: lobe normals are yet to be set from the point
+  union {  // only the first `count` are alive; the rest costs nothing
+    Lobe lobes[kMaxLobes];
+  };
+  Surface() {}
+  Surface(const Surface& other) { *this = other; }
+  Surface& operator=(const Surface& other) {
+    count = other.count, effects = other.effects, emission = other.emission, transparency = other.transparency;
+    holdout = other.holdout, needs_frame = other.needs_frame;
+    for (int i = 0; i < count; ++i) lobes[i] = other.lobes[i];
+    return *this;
+  }
+  void clear() { count = 0, effects = 0, emission = transparency = Rgb(0.0f), holdout = 0.0f, needs_frame = false; }
 };
 
 /// BSDF × |cos| by pass class, and the solid-angle density with which sample() would choose the direction.
@@ -91,5 +125,37 @@ struct SurfaceAlbedo {
   Rgb diffuse{0.0f}, glossy{0.0f}, transmission{0.0f};
 };
 SurfaceAlbedo albedo(const Surface&, const Vec3& outgoing);
+
+template <>
+BsdfValue evaluate<false>(const Surface&, const Vec3& face_normal, const Vec3& outgoing, const Vec3& incoming);
+template <>
+BsdfSample sample<false>(const Surface&, const Vec3& face_normal, const Vec3& outgoing, float u_lobe, const Vec2& u);
+
+template <>
+inline BsdfValue evaluate<true>(const Surface& surface, const Vec3& face_normal, const Vec3&, const Vec3& incoming) {
+  BsdfValue value;
+  if (surface.count == 0 || glm::dot(face_normal, incoming) <= 0.0f) return value;
+  const Lobe& lobe = surface.lobes[0];
+  const float cosine = glm::dot(lobe.normal, incoming);
+  if (cosine <= 0.0f) return value;
+  value.density = cosine * kInvPi;
+  value.diffuse = lobe.weight * value.density;
+  return value;
+}
+
+template <>
+inline BsdfSample sample<true>(const Surface& surface, const Vec3& face_normal, const Vec3&, float, const Vec2& u) {
+  BsdfSample result;
+  if (surface.count == 0) return result;
+  const Lobe& lobe = surface.lobes[0];
+  const float radius = std::sqrt(u.x), phi = 2.0f * kPi * u.y;
+  const float z = std::sqrt(std::fmax(0.0f, 1.0f - u.x));
+  result.direction = Frame(lobe.normal).to_world({radius * std::cos(phi), radius * std::sin(phi), z});
+  if (z <= 0.0f || glm::dot(face_normal, result.direction) <= 0.0f) return result;
+  result.value.density = z * kInvPi;
+  result.value.diffuse = lobe.weight * result.value.density;
+  result.valid = true;
+  return result;
+}
 
 }  // namespace afterglow

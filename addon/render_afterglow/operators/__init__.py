@@ -3,9 +3,9 @@
 
 import bpy
 
-from . import accuracy, information, presets
+from . import information, presets
 
-_modules = (accuracy, information, presets)
+_modules = (information, presets)
 
 
 def register() -> None:
@@ -15,7 +15,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    accuracy.stop_all()
     for module in reversed(_modules):
         for operator in reversed(module.classes):
             bpy.utils.unregister_class(operator)

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The GGX distribution of normals with Smith's masking (Walter et al. 2007; Heitz 2014), sampling of its visible normals
+// by spherical caps (Dupuy and Benyoub 2023), and Fresnel terms. All directions in the frame of the normal, z up.
+#pragma once
+
+#include "materials/surface.h"
+
+namespace afterglow {
+
+inline float sqr(float x) { return x * x; }
+inline float saturate(float x) { return x < 0.0f ? 0.0f : (x > 1.0f ? 1.0f : x); }  // NaN stays NaN
+inline Rgb saturate(const Rgb& c) { return {saturate(c.x), saturate(c.y), saturate(c.z)}; }
+inline Rgb lerp(const Rgb& a, const Rgb& b, float t) { return a + (b - a) * t; }
+inline float mean(const Rgb& c) { return (c.x + c.y + c.z) * (1.0f / 3.0f); }
+
+/// Exact unpolarised reflectance; cosine ≥ 0 on the incident side, eta = other side over incident side.
+inline float fresnel_dielectric(float cosine, float eta) {
+  const float g2 = eta * eta - 1.0f + cosine * cosine;
+  if (g2 <= 0.0f) return 1.0f;
+  const float g = std::sqrt(g2);
+  const float a = (g - cosine) / (g + cosine);
+  const float b = (cosine * (g + cosine) - 1.0f) / (cosine * (g - cosine) + 1.0f);
+  return 0.5f * a * a * (1.0f + b * b);
+}
+inline float f0_from_ior(float ior) { return sqr((ior - 1.0f) / (ior + 1.0f)); }
+inline float ior_from_f0(float f0) {
+  const float root = std::sqrt(saturate(f0) < 0.99f ? saturate(f0) : 0.99f);
+  return (1.0f + root) / (1.0f - root);
+}
+inline float fifth(float x) { return sqr(sqr(x)) * x; }
+Rgb fresnel_conductor(float cosine, const Rgb& n, const Rgb& k);
+
+/// Reflected share at a microfacet, by the lobe's Fresnel term. ior as the ray meets the surface.
+inline Rgb fresnel(const Lobe& lobe, float cosine) {
+  switch (lobe.fresnel) {
+    case Fresnel::kNone: return Rgb(1.0f);
+    case Fresnel::kDielectric: return Rgb(fresnel_dielectric(cosine, lobe.ior));
+    case Fresnel::kSchlick: {
+      const float start = f0_from_ior(lobe.ior);
+      const float share = saturate((fresnel_dielectric(cosine, lobe.ior) - start) / (1.0f - start));
+      const Rgb end = lobe.kind == LobeKind::kMicrofacetReflection ? lobe.f90 : Rgb(1.0f);
+      return lerp(lobe.f0, end, share);
+    }
+    case Fresnel::kF82: {
+      const float x = saturate(1.0f - cosine);
+      return saturate(lerp(lobe.f0, Rgb(1.0f), fifth(x)) - lobe.f90 * (cosine * fifth(x) * x));
+    }
+    case Fresnel::kConductor: return fresnel_conductor(cosine, lobe.f0, lobe.f90);
+  }
+  return Rgb(1.0f);
+}
+/// The factor B of Lazanyi's term, so that the reflectance at about 82° is f82 × Schlick's (Kutz et al. 2021).
+inline Rgb f82_factor(const Rgb& f0, const Rgb& f82) {
+  const float cosine = 1.0f / 7.0f, x = 6.0f / 7.0f;
+  return lerp(f0, Rgb(1.0f), fifth(x)) * (Rgb(1.0f) - f82) / (cosine * fifth(x) * x);
+}
+
+inline float ggx_lambda(const Vec3& v, float ax, float ay) {
+  const float t = (sqr(ax * v.x) + sqr(ay * v.y)) / sqr(v.z);
+  return 0.5f * (std::sqrt(1.0f + t) - 1.0f);
+}
+inline float ggx_distribution(const Vec3& h, float ax, float ay) {
+  const float s = sqr(h.x / ax) + sqr(h.y / ay) + sqr(h.z);
+  return kInvPi / (ax * ay * s * s);
+}
+/// A visible normal for the direction o (o.z > 0), with density G1(o) D(h) (o·h) / o.z.
+inline Vec3 ggx_sample(const Vec3& o, float ax, float ay, const Vec2& u) {
+  const Vec3 w = glm::normalize(Vec3(ax * o.x, ay * o.y, o.z));
+  const float phi = 2.0f * kPi * u.x;
+  const float z = (1.0f - u.y) * (1.0f + w.z) - w.z;
+  const float r = std::sqrt(saturate(1.0f - z * z));
+  const Vec3 h = Vec3(r * std::cos(phi), r * std::sin(phi), z) + w;
+  return glm::normalize(Vec3(ax * h.x, ay * h.y, std::fmax(h.z, 1e-7f)));
+}
+/// Burley's generalised Trowbridge–Reitz distribution with exponent 1.
+inline float gtr1_distribution(float cosine, float alpha) {
+  if (alpha >= 1.0f) return kInvPi;
+  const float a2 = alpha * alpha;
+  return (a2 - 1.0f) / (kPi * std::log(a2) * (1.0f + (a2 - 1.0f) * sqr(cosine)));
+}
+
+}  // namespace afterglow
