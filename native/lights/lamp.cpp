@@ -30,8 +30,8 @@ float spot_attenuation(const Lamp& lamp, const Vec3& from_lamp) {
 }
 
 /// What a grid of slats before an area light lets through: falls linearly in the tangent, keeps the whole power.
-float spread_attenuation(const Lamp& lamp, float cosine) {
-  const float tangent = std::sqrt(std::max(1.0f - cosine * cosine, 0.0f)) / cosine;
+float spread_attenuation(const Lamp& lamp, const Vec3& direction, float cosine) {
+  const float tangent = glm::length(glm::cross(direction, lamp.axis)) / cosine;
   return std::max(lamp.tan_half_spread - tangent, 0.0f) * lamp.spread_scale;
 }
 
@@ -99,29 +99,97 @@ bool make_sun(const Light& light, Lamp& lamp) {
 
 float hit_uv(const Vec3& offset, const Vec3& edge) { return glm::dot(offset, edge) / glm::dot(edge, edge); }
 
+/// A point of the light's plane, relative to its centre, in units of its edges.
+Vec2 in_edges(const Lamp& lamp, const Vec3& offset) {
+  if (lamp.orthogonal) return {hit_uv(offset, lamp.edge_u), hit_uv(offset, lamp.edge_v)};
+  const Vec3 n = glm::cross(lamp.edge_u, lamp.edge_v);  // sheared: solve for both edges together
+  const float inverse = 1.0f / glm::dot(n, n);
+  return {glm::dot(glm::cross(offset, lamp.edge_v), n) * inverse,
+          glm::dot(glm::cross(lamp.edge_u, offset), n) * inverse};
+}
+
+/// The part of an area light that can send light here, as a share of its edges (0: its centre). A narrow spread leaves
+/// only what lies within height · tan of the point's foot; an ellipse is then replaced by that disk, if it is smaller.
+struct Window {
+  Vec2 lower{-0.5f}, upper{0.5f};
+  bool disk = false;
+  Vec3 foot{0.0f};  // of the point in the light's plane, relative to the light's centre
+  float disk_radius = 0.0f;
+  float area = 0.0f;
+};
+
+bool visible_window(const Lamp& lamp, const Vec3& to_center, float height, Window& w) {
+  w.area = lamp.area;
+  if (!lamp.spread) return true;
+  const float reach = height * lamp.tan_half_spread;
+  w.foot = -to_center - lamp.axis * height;
+  if (lamp.shape == LampShape::kEllipse) {
+    const float disk_area = kPi * reach * reach;
+    if (disk_area < lamp.area) w.disk = true, w.disk_radius = reach, w.area = disk_area;
+    return true;
+  }
+  if (!lamp.orthogonal) return true;
+  const Vec2 foot(hit_uv(w.foot, lamp.edge_u), hit_uv(w.foot, lamp.edge_v));
+  const Vec2 extent(reach / glm::length(lamp.edge_u), reach / glm::length(lamp.edge_v));
+  w.lower = glm::max(Vec2(-0.5f), foot - extent), w.upper = glm::min(Vec2(0.5f), foot + extent);
+  const Vec2 size = w.upper - w.lower;
+  w.area = lamp.area * size.x * size.y;
+  return size.x > 0.0f && size.y > 0.0f && w.area > 0.0f;
+}
+
+RectangleView rectangle_view(const Lamp& lamp, const Vec3& position, const Window& w) {
+  const Vec3 corner = lamp.position + w.lower.x * lamp.edge_u + w.lower.y * lamp.edge_v;
+  const Vec2 size = w.upper - w.lower;
+  return {position, corner, size.x * lamp.edge_u, size.y * lamp.edge_v};
+}
+
 bool sample_area(const Lamp& lamp, const Vec3& position, const Vec2& u, LampSample& out) {
   const Vec3 to_center = lamp.position - position;
   const float height = -glm::dot(to_center, lamp.axis);  // one-sided
-  if (!(height > 0.0f)) return false;
-  Vec2 p = lamp.shape == LampShape::kEllipse ? 0.5f * square_to_disk(u) : u - 0.5f;
-  if (lamp.shape == LampShape::kRectangle && lamp.orthogonal) {
-    const RectangleView view(position, lamp.position - 0.5f * (lamp.edge_u + lamp.edge_v), lamp.edge_u, lamp.edge_v);
-    if (view.usable()) {
-      p = view.sample(u) - 0.5f;
-      out.density = 1.0f / view.solid_angle();
+  Window window;
+  if (!(height > 0.0f) || !visible_window(lamp, to_center, height, window)) return false;
+  Vec3 to_point;
+  if (lamp.shape == LampShape::kEllipse) {
+    const Vec2 d = square_to_disk(u);
+    if (window.disk) {
+      const Frame frame(lamp.axis);
+      const Vec3 offset = window.foot + (d.x * frame.t + d.y * frame.b) * window.disk_radius;
+      const Vec2 p = in_edges(lamp, offset);
+      if (glm::dot(p, p) > 0.25f) return false;
+      to_point = to_center + offset, out.uv = p + 0.5f;
+    } else {
+      to_point = to_center + 0.5f * (d.x * lamp.edge_u + d.y * lamp.edge_v), out.uv = 0.5f * d + 0.5f;
     }
+  } else {
+    Vec2 q = u;
+    if (lamp.orthogonal) {
+      const RectangleView view = rectangle_view(lamp, position, window);
+      if (view.usable()) q = view.sample(u), out.density = 1.0f / view.solid_angle();
+    }
+    const Vec2 p = window.lower + q * (window.upper - window.lower);
+    to_point = to_center + p.x * lamp.edge_u + p.y * lamp.edge_v, out.uv = p + 0.5f;
   }
-  const Vec3 to_point = to_center + p.x * lamp.edge_u + p.y * lamp.edge_v;
   const float d2 = glm::dot(to_point, to_point);
   if (!(d2 > 0.0f)) return false;
   out.distance = std::sqrt(d2);
   out.direction = to_point / out.distance;
   const float cosine = -glm::dot(out.direction, lamp.axis);
   if (!(cosine > 0.0f)) return false;
-  if (out.density == 0.0f) out.density = area_to_solid_angle(1.0f / lamp.area, d2, cosine);
-  out.radiance = lamp.spread ? lamp.radiance * spread_attenuation(lamp, cosine) : lamp.radiance;
-  out.uv = p + 0.5f;
+  if (out.density == 0.0f) out.density = area_to_solid_angle(1.0f / window.area, d2, cosine);
+  out.radiance = lamp.spread ? lamp.radiance * spread_attenuation(lamp, out.direction, cosine) : lamp.radiance;
   return true;
+}
+
+float area_density(const Lamp& lamp, const Vec3& position, const Vec3& direction, float t) {
+  const Vec3 to_center = lamp.position - position;
+  const float height = -glm::dot(to_center, lamp.axis), cosine = -glm::dot(direction, lamp.axis);
+  Window window;
+  if (!(height > 0.0f) || !(cosine > 0.0f) || !visible_window(lamp, to_center, height, window)) return 0.0f;
+  if (lamp.shape == LampShape::kRectangle && lamp.orthogonal) {
+    const RectangleView view = rectangle_view(lamp, position, window);
+    if (view.usable()) return 1.0f / view.solid_angle();
+  }
+  return area_to_solid_angle(1.0f / window.area, t * t, cosine);
 }
 
 bool sample_round(const Lamp& lamp, const Vec3& position, const Vec3& normal, const Vec2& u, LampSample& out) {
@@ -138,14 +206,12 @@ bool sample_round(const Lamp& lamp, const Vec3& position, const Vec3& normal, co
   }
   if (lamp.shape == LampShape::kDisk) {
     if (!(d2 > 0.0f)) return false;
-    const float d = std::sqrt(d2);
-    const Vec2 p = square_to_disk(u) * lamp.radius;
-    const Frame frame(-to_center / d);
-    const Vec3 to_point = to_center + p.x * frame.t + p.y * frame.b;
-    const float t2 = d2 + p.x * p.x + p.y * p.y;
-    out.distance = std::sqrt(t2);
-    out.direction = to_point / out.distance;
-    out.density = area_to_solid_angle(1.0f / lamp.area, t2, d / out.distance);
+    // A disk that faces the point is exactly a cap of directions.
+    const float one_minus = one_minus_cos_of(r2 / (d2 + r2)), d = std::sqrt(d2);
+    const Vec3 local = square_to_cone(u, one_minus);
+    out.direction = glm::normalize(Frame(to_center / d).to_world(local));
+    out.density = cone_density(one_minus);
+    out.distance = d / local.z;
   } else if (d2 > r2 * 1.000001f) {
     const float one_minus = one_minus_cos_of(r2 / d2), d = std::sqrt(d2);
     const Vec3 local = square_to_cone(u, one_minus);
@@ -252,17 +318,11 @@ bool intersect_lamp(const Lamp& lamp, const Vec3& origin, const Vec3& direction,
       const float t = -glm::dot(to_center, lamp.axis) / cosine;
       if (!(t > t_min && t < t_max)) return false;
       const Vec3 offset = direction * t - to_center;
-      Vec2 p(hit_uv(offset, lamp.edge_u), hit_uv(offset, lamp.edge_v));
-      if (!lamp.orthogonal) {  // sheared: solve for both edges together
-        const Vec3 n = glm::cross(lamp.edge_u, lamp.edge_v);
-        const float inverse = 1.0f / glm::dot(n, n);
-        p = {glm::dot(glm::cross(offset, lamp.edge_v), n) * inverse,
-             glm::dot(glm::cross(lamp.edge_u, offset), n) * inverse};
-      }
+      const Vec2 p = in_edges(lamp, offset);
       const bool round = lamp.shape == LampShape::kEllipse;
       if (round ? glm::dot(p, p) > 0.25f : std::fabs(p.x) > 0.5f || std::fabs(p.y) > 0.5f) return false;
       hit.t = t, hit.uv = p + 0.5f;
-      hit.radiance = lamp.spread ? lamp.radiance * spread_attenuation(lamp, cosine) : lamp.radiance;
+      hit.radiance = lamp.spread ? lamp.radiance * spread_attenuation(lamp, direction, cosine) : lamp.radiance;
       return !is_black(hit.radiance);
     }
     case LampShape::kSphere: {
@@ -291,19 +351,11 @@ float lamp_density(const Lamp& lamp, const Vec3& position, const Vec3& normal, c
   const Vec3 to_center = lamp.position - position;
   switch (lamp.shape) {
     case LampShape::kRectangle:
-      if (lamp.orthogonal) {
-        const RectangleView view(position, lamp.position - 0.5f * (lamp.edge_u + lamp.edge_v), lamp.edge_u,
-                                 lamp.edge_v);
-        if (view.usable()) return 1.0f / view.solid_angle();
-      }
-      [[fallthrough]];
-    case LampShape::kEllipse: {
-      const float cosine = -glm::dot(direction, lamp.axis);
-      return cosine > 0.0f ? area_to_solid_angle(1.0f / lamp.area, t * t, cosine) : 0.0f;
-    }
+    case LampShape::kEllipse:
+      return area_density(lamp, position, direction, t);
     case LampShape::kDisk: {
-      const float d = glm::length(to_center), cosine = glm::dot(direction, to_center) / d;
-      return cosine > 0.0f ? area_to_solid_angle(1.0f / lamp.area, t * t, cosine) : 0.0f;
+      const float d2 = glm::dot(to_center, to_center), r2 = lamp.radius * lamp.radius;
+      return d2 > 0.0f ? cone_density(one_minus_cos_of(r2 / (d2 + r2))) : 0.0f;
     }
     case LampShape::kSphere: {
       const float d2 = glm::dot(to_center, to_center), r2 = lamp.radius * lamp.radius;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Python's view of light sampling, for tests and researchers: what is chosen from a point, and the density that the other
-// side of multiple importance sampling would report; and the denoisers.
+// Python's view of light sampling, for tests and researchers: what is chosen from a point, and the density that the
+// other side of multiple importance sampling would report.
 #include "base/parallel.h"
-#include "film/denoiser.h"
 #include "module/bindings.h"
 
 namespace afterglow {
@@ -29,11 +28,11 @@ auto rows_of(const py::handle& value, const std::string& what, py::ssize_t& coun
   return array;
 }
 
-Array table(py::ssize_t rows, py::ssize_t columns) {
-  return columns == 1 ? Array(rows) : Array({rows, columns});
-}
+Array table(py::ssize_t rows, py::ssize_t columns) { return columns == 1 ? Array(rows) : Array({rows, columns}); }
 
-void put(float* out, py::ssize_t row, const Vec3& v) { out[3 * row] = v.x, out[3 * row + 1] = v.y, out[3 * row + 2] = v.z; }
+void put(float* out, py::ssize_t row, const Vec3& v) {
+  out[3 * row] = v.x, out[3 * row + 1] = v.y, out[3 * row + 2] = v.z;
+}
 
 template <class T>
 const T* row(const py::array_t<T, py::array::c_style | py::array::forcecast>& a, py::ssize_t i) {
@@ -68,8 +67,8 @@ py::dict light_sample(const PyScene& scene, const py::object& point, const py::o
     each(n, [&](py::ssize_t i) {
       const float *nn = row(normals, i), *uu = row(numbers, i);
       LightSample s;
-      found[i] = core.lights.sample(relative(row(points, i), origin), Vec3(nn[0], nn[1], nn[2]), uu[0],
-                                    Vec2(uu[1], uu[2]), s);
+      found[i] =
+          core.lights.sample(relative(row(points, i), origin), Vec3(nn[0], nn[1], nn[2]), uu[0], Vec2(uu[1], uu[2]), s);
       if (!found[i]) s = LightSample{};
       put(to, i, s.direction), put(shine, i, s.radiance);
       far[i] = s.distance, share[i] = s.density, is_delta[i] = s.delta, index[i] = s.light;
@@ -81,7 +80,8 @@ py::dict light_sample(const PyScene& scene, const py::object& point, const py::o
   return d;
 }
 
-/// What a ray meets, as a path tracer's surface sample would: the nearest lamp or emissive triangle, else suns and world.
+/// What a ray meets, as a path tracer's surface sample would: the nearest lamp or emissive triangle, else suns and
+/// world.
 void follow(const CommittedScene& core, const Ray& ray, const Vec3& normal, float& t, Rgb& radiance, float& density) {
   Hit hit;
   LightHit lamp;
@@ -111,7 +111,8 @@ void follow(const CommittedScene& core, const Ray& ray, const Vec3& normal, floa
   }
 }
 
-py::dict light_density(const PyScene& scene, const py::object& point, const py::object& normal, const py::object& direction) {
+py::dict light_density(const PyScene& scene, const py::object& point, const py::object& normal,
+                       const py::object& direction) {
   py::ssize_t n = 1;
   const auto points = rows_of<double>(point, "light_density: point", n);
   const auto normals = rows_of<float>(normal, "light_density: normal", n);
@@ -135,58 +136,11 @@ py::dict light_density(const PyScene& scene, const py::object& point, const py::
   return d;
 }
 
-py::list denoisers(const std::vector<std::string>& search) {
-  std::vector<DenoiserInfo> all;
-  {
-    py::gil_scoped_release release;
-    all = list_denoisers(search);
-  }
-  py::list list;
-  for (const DenoiserInfo& info : all) {
-    py::dict d;
-    d["id"] = info.id, d["label"] = info.label, d["available"] = info.available;
-    d["reason"] = info.reason, d["path"] = info.path, d["version"] = info.version;
-    list.append(d);
-  }
-  return list;
-}
-
-Array image_of(const py::object& value, const std::string& what, const Array* like) {
-  auto image = Array::ensure(value);
-  if (!image) {
-    PyErr_Clear();
-    throw InvalidInput("denoise: " + what + " must be an array of numbers");
-  }
-  if (image.ndim() != 3 || image.shape(2) != 3) throw InvalidInput("denoise: " + what + " must have the shape (height, width, 3)");
-  if (like && (image.shape(0) != like->shape(0) || image.shape(1) != like->shape(1)))
-    throw InvalidInput("denoise: " + what + " must have the size of color");
-  return image;
-}
-
-Array denoise(const py::object& color, const py::object& albedo, const py::object& normal, const std::string& denoiser,
-              const std::vector<std::string>& search) {
-  const Array image = image_of(color, "color", nullptr);
-  Array first, second;
-  DenoiseInput in;
-  in.color = image.data();
-  in.height = uint32_t(image.shape(0)), in.width = uint32_t(image.shape(1));
-  if (!albedo.is_none()) first = image_of(albedo, "albedo", &image), in.albedo = first.data();
-  if (!normal.is_none()) second = image_of(normal, "normal", &image), in.normal = second.data();
-  Array out({image.shape(0), image.shape(1), py::ssize_t(3)});
-  float* pixels = out.mutable_data();
-  py::gil_scoped_release release;
-  make_denoiser(denoiser, search)->filter(in, pixels);
-  return out;
-}
-
 }  // namespace
 
 void bind_lights(py::module_& m) {
   m.def("light_sample", light_sample, py::arg("scene"), py::arg("point"), py::arg("normal"), py::arg("u"));
   m.def("light_density", light_density, py::arg("scene"), py::arg("point"), py::arg("normal"), py::arg("direction"));
-  m.def("denoisers", denoisers, py::arg("search") = std::vector<std::string>{});
-  m.def("denoise", denoise, py::arg("color"), py::arg("albedo") = py::none(), py::arg("normal") = py::none(), py::kw_only(),
-        py::arg("denoiser") = "AUTO", py::arg("search") = std::vector<std::string>{});
 }
 
 }  // namespace afterglow

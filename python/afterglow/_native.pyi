@@ -215,5 +215,11 @@ def bsdf_evaluate(graph: Graph, wo: NDArray[np.float32], wi: NDArray[np.float32]
 def bsdf_sample(graph: Graph, wo: NDArray[np.float32], u: NDArray[np.float32], **point: Any) -> dict[str, NDArray[Any]]: ...
 def evaluate_graph(graph: Graph, points: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float32]]:
     """Emission, transparency and albedos of a material's graph at N points (uv, position, normal, incoming, …)."""
-def light_sample(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32], u: NDArray[np.float32]) -> dict[str, NDArray[Any]]: ...
+def light_sample(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32], u: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+    """Choices of a light and a direction from N points (arrays of one row stand for all): u (N, 3) are the choice and two
+    numbers for the direction; normal 0: from all sides. valid, direction (N, 3), distance, radiance (N, 3), density
+    (solid angle, choice included), delta, light."""
+def light_density(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32], direction: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+    """What rays meet, as a surface's own samples would: distance, radiance (N, 3), and the density with which light_sample
+    chooses the same direction on what was met (nearest light or surface; else suns and world together)."""
 def sobol(count: int, dimensions: int, seed: int) -> NDArray[np.float32]: ...
