@@ -15,8 +15,9 @@ import bpy
 import numpy as np
 
 from . import backend, display, passes, store
-from .properties.scene import session_settings
-from .sync import SceneSync, sync_camera_final
+from .native_scene import NativeScene
+from .properties.scene import mist_settings, session_settings
+from .sync import sync_camera_final
 
 POLL_SECONDS = 0.02  # how often the user's wish to cancel is looked at
 STATUS_SECONDS = 0.25  # how often progress is told
@@ -34,25 +35,6 @@ PREVIEW_SETTINGS = {
 
 class RefusedError(Exception):
     """What Afterglow does not do; the text goes to the user as it is."""
-
-
-class NativeScene:
-    """A native scene, what keeps it equal to the depsgraph, and the warnings that it gave."""
-
-    def __init__(self) -> None:
-        self.warnings: list[str] = []
-        self.scene = backend.afterglow.Scene()
-        self.sync = SceneSync(self.scene, self.log)
-
-    def log(self, level: str, text: str) -> None:
-        if level == "warning":
-            self.warnings.append(text)
-        else:
-            print("Afterglow:", text)
-
-    def take_warnings(self) -> list[str]:
-        taken, self.warnings[:] = list(dict.fromkeys(self.warnings)), []
-        return taken
 
 
 def render(engine: bpy.types.RenderEngine, depsgraph: bpy.types.Depsgraph) -> None:
@@ -95,7 +77,7 @@ def render_layer(
     if persistent:
         store.keep(scene, layer, native)
 
-    report = native.sync.sync(depsgraph)
+    native.sync_with(depsgraph)
     view = sync_camera_final(engine, depsgraph)
     if view is None:
         raise RefusedError(f"the scene '{scene.name}' has no camera: add one, or make one the scene's camera")
@@ -107,7 +89,6 @@ def render_layer(
     changes = native.scene.commit()
     seconds["commit"] = time.perf_counter() - started - seconds["sync"]
     warnings = native.take_warnings() + list(view.warnings) + list(changes["warnings"])
-    del report
 
     wanted = list(passes.wanted(depsgraph.view_layer)) if not engine.is_preview else [passes.COMBINED]
     settings = session_settings(scene, viewport=False)
@@ -141,12 +122,6 @@ def render_layer(
         for text in warnings:
             engine.report({"WARNING"}, f"Afterglow: {text}")
     engine.update_stats("", prefix + "Finished")
-
-
-def mist_settings(scene: bpy.types.Scene) -> tuple[float, float, str]:
-    """Start, depth and falloff of the mist pass; Blender's defaults where the scene has no world."""
-    mist = scene.world.mist_settings if scene.world is not None else None
-    return (mist.start, mist.depth, mist.falloff.lower()) if mist is not None else (5.0, 25.0, "quadratic")
 
 
 def run(

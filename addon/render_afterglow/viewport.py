@@ -16,9 +16,10 @@ from typing import Any
 import bpy
 
 from . import backend, display
-from .final import NativeScene, mist_settings
-from .properties.scene import session_settings
+from .native_scene import NativeScene
+from .properties.scene import mist_settings, session_settings
 from .sync import sync_camera_view
+from .sync.scene import viewport_shading
 
 WATCH_SECONDS = 0.015  # how often the watcher looks for a newer picture
 REDRAW_SECONDS = 0.05  # between two redraws of a picture that refines slowly, at least
@@ -91,6 +92,10 @@ class Viewport:
         self.generation = -1
         self.camera: Any = None
         self.settings: dict[str, Any] = {}
+        self.shading: Any = None  # scene's or studio's lights and world, as they were synced
+        self.shown: tuple[Any, ...] | None = None  # what decides which objects this view shows, as it was last
+        self.local_view: list[int] | None = None
+        self.paused = False
         self.failure = ""
         self.watcher = Watcher(engine)
         self.watcher.start()
@@ -122,18 +127,24 @@ class Viewport:
     def _update(self, engine: Any, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         if self.native is None:
             self.native = NativeScene()
+        self.shown = None
         if self.session is None:
-            self.native.sync.sync(depsgraph, view=context.space_data)
-            self._set_view(engine, context, depsgraph)
+            self._sync(context, depsgraph)
+            self._set_view(context, depsgraph)
         else:
             with self.session.edit():
-                self.native.sync.sync(depsgraph, view=context.space_data)
+                self._sync(context, depsgraph)
                 self.native.scene.commit()
+            self._set_view(context, depsgraph)
             self.watcher.wake()
         for text in self.native.take_warnings():
             print("Afterglow:", text)
 
-    def _set_view(self, engine: Any, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+    def _sync(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        self.native.sync.sync(depsgraph, view=context.space_data)
+        self.shading = viewport_shading(context.space_data)
+
+    def _set_view(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """Starts the session or gives it the new view and settings, where these differ from the last ones."""
         scene, region, space = depsgraph.scene, context.region, context.space_data
         view = sync_camera_view(depsgraph, region, context.region_data, space, 1.0 / pixel_size(scene))
@@ -144,9 +155,10 @@ class Viewport:
             region=view.region,
             passes=["combined"],
             mist=mist_settings(scene),
-            local_view=self.native.sync.local_view(space),
+            local_view=self._local_view(space, depsgraph),
         )
         key = (view.camera, view.width, view.height, view.region)
+        self.view = view
         if self.session is None:
             self.native.scene.set_camera(**view.camera)
             self.native.scene.commit()
@@ -155,15 +167,36 @@ class Viewport:
             self.watcher.watch(self.session)
         else:
             moved = not same_camera(key, self.camera)
-            if moved:
+            relit = viewport_shading(space) != self.shading
+            if moved or relit:
                 with self.session.edit():
+                    if relit:
+                        self._sync(context, depsgraph)
                     self.native.scene.set_camera(**view.camera)
                     self.native.scene.commit()
             if settings != self.settings:
                 self.session.update(settings)
-            if moved or settings != self.settings:
+            if moved or relit or settings != self.settings:
                 self.watcher.wake()
-        self.camera, self.settings, self.view = key, settings, view
+        self.camera, self.settings = key, settings
+        self._pause(scene.afterglow.preview_pause)
+
+    def _local_view(self, space: bpy.types.SpaceView3D, depsgraph: bpy.types.Depsgraph) -> list[int] | None:
+        """Handles of what this view shows; asked anew only after an edit or where the view's own choice changed."""
+        shown = (space.local_view is not None, space.use_local_collections)
+        if shown != self.shown:
+            self.shown = shown
+            self.local_view = self.native.sync.local_view(space, depsgraph) if any(shown) else None
+        return self.local_view
+
+    def _pause(self, wanted: bool) -> None:
+        if wanted != self.paused:
+            self.paused = wanted
+            if wanted:
+                self.session.pause()
+            else:
+                self.session.resume()
+                self.watcher.wake()
 
     # Drawing --------------------------------------------------------------------------------------------------------
 
@@ -172,7 +205,7 @@ class Viewport:
         if self.session is None:
             return
         try:
-            self._set_view(engine, context, depsgraph)
+            self._set_view(context, depsgraph)
             self._draw(engine, context)
         except Exception as error:
             traceback.print_exc()

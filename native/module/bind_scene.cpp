@@ -190,48 +190,56 @@ void bind_objects(py::class_<PyScene, std::shared_ptr<PyScene>>& scene) {
              const EditLock lock(self);
              self.core->scene.remove_mesh(handle);
            })
-      .def("add_instances", &add_instances)
-      .def("set_transforms", &set_transforms)
-      .def("set_instances", &set_instances)
+      .def("add_instances", &add_instances, py::arg("mesh"), py::arg("transforms"))
+      .def("set_transforms", &set_transforms, py::arg("instances"), py::arg("transforms"))
+      .def("set_instances", &set_instances, py::arg("instances"))
       .def("remove_instances", &remove_instances);
 }
 
 void bind_images_and_materials(py::class_<PyScene, std::shared_ptr<PyScene>>& scene) {
   scene
-      .def("add_image",
-           [](PyScene& self, const py::object& source, const py::kwargs& arguments) {
-             const EditLock lock(self);
-             Image image;
-             read_image(image, source, arguments);
-             return self.core->scene.add_image(std::move(image));
-           })
-      .def("set_image",
-           [](PyScene& self, Handle handle, const py::object& source, const py::kwargs& arguments) {
-             const EditLock lock(self);
-             Image image = self.core->scene.image(handle);
-             read_image(image, source, arguments);
-             self.core->scene.set_image(handle, std::move(image));
-           })
+      .def(
+          "add_image",
+          [](PyScene& self, const py::object& source, const py::kwargs& arguments) {
+            const EditLock lock(self);
+            Image image;
+            read_image(image, source, arguments);
+            return self.core->scene.add_image(std::move(image));
+          },
+          py::arg("source"))
+      .def(
+          "set_image",
+          [](PyScene& self, Handle handle, const py::object& source, const py::kwargs& arguments) {
+            const EditLock lock(self);
+            Image image = self.core->scene.image(handle);
+            read_image(image, source, arguments);
+            self.core->scene.set_image(handle, std::move(image));
+          },
+          py::arg("image"), py::arg("source"))
       .def("remove_image",
            [](PyScene& self, Handle handle) {
              const EditLock lock(self);
              self.core->scene.remove_image(handle);
            })
-      .def("add_material",
-           [](PyScene& self, const py::object& graph, const py::kwargs& arguments) {
-             const EditLock lock(self);
-             Material material;
-             read_material(material, graph, arguments);
-             return self.core->scene.add_material(std::move(material));
-           })
-      .def("set_material",
-           [](PyScene& self, Handle handle, const py::object& graph, const py::kwargs& arguments) {
-             const EditLock lock(self);
-             if (handle == 0) throw InvalidHandle("no material has the handle 0");
-             Material material = self.core->scene.material(handle);
-             read_material(material, graph, arguments);
-             self.core->scene.set_material(handle, std::move(material));
-           })
+      .def(
+          "add_material",
+          [](PyScene& self, const py::object& graph, const py::kwargs& arguments) {
+            const EditLock lock(self);
+            Material material;
+            read_material(material, graph, arguments);
+            return self.core->scene.add_material(std::move(material));
+          },
+          py::arg("graph"))
+      .def(
+          "set_material",
+          [](PyScene& self, Handle handle, const py::object& graph, const py::kwargs& arguments) {
+            const EditLock lock(self);
+            if (handle == 0) throw InvalidHandle("no material has the handle 0");
+            Material material = self.core->scene.material(handle);
+            read_material(material, graph, arguments);
+            self.core->scene.set_material(handle, std::move(material));
+          },
+          py::arg("material"), py::arg("graph"))
       .def("remove_material", [](PyScene& self, Handle handle) {
         const EditLock lock(self);
         self.core->scene.remove_material(handle);
@@ -240,34 +248,40 @@ void bind_images_and_materials(py::class_<PyScene, std::shared_ptr<PyScene>>& sc
 
 void bind_lights_and_view(py::class_<PyScene, std::shared_ptr<PyScene>>& scene) {
   scene
-      .def("add_light",
-           [](PyScene& self, const py::object& kind, const py::object& transform, py::kwargs arguments) {
-             const EditLock lock(self);
-             arguments["kind"] = kind;
-             arguments["transform"] = transform;
-             Light light;
-             read_light(light, arguments);
-             return self.core->scene.add_light(std::move(light));
-           })
-      .def("set_light",
-           [](PyScene& self, Handle handle, const py::kwargs& arguments) {
-             const EditLock lock(self);
-             Light light = self.core->scene.light(handle);
-             read_light(light, arguments);
-             self.core->scene.set_light(handle, std::move(light));
-           })
+      .def(
+          "add_light",
+          [](PyScene& self, const py::object& kind, const py::object& transform, py::kwargs arguments) {
+            const EditLock lock(self);
+            arguments["kind"] = kind;
+            arguments["transform"] = transform;
+            Light light;
+            read_light(light, arguments);
+            return self.core->scene.add_light(std::move(light));
+          },
+          py::arg("kind"), py::arg("transform"))
+      .def(
+          "set_light",
+          [](PyScene& self, Handle handle, const py::kwargs& arguments) {
+            const EditLock lock(self);
+            Light light = self.core->scene.light(handle);
+            read_light(light, arguments);
+            self.core->scene.set_light(handle, std::move(light));
+          },
+          py::arg("light"))
       .def("remove_light",
            [](PyScene& self, Handle handle) {
              const EditLock lock(self);
              self.core->scene.remove_light(handle);
            })
-      .def("set_world",
-           [](PyScene& self, const py::object& graph, const py::kwargs& arguments) {
-             const EditLock lock(self);
-             World world;
-             read_world(world, graph, arguments);
-             self.core->scene.set_world(std::move(world));
-           })
+      .def(
+          "set_world",
+          [](PyScene& self, const py::object& graph, const py::kwargs& arguments) {
+            const EditLock lock(self);
+            World world;
+            read_world(world, graph, arguments);
+            self.core->scene.set_world(std::move(world));
+          },
+          py::arg("graph"))
       .def(
           "set_camera",
           [](PyScene& self, const py::object& kind, const py::object& transform, py::kwargs arguments) {

@@ -12,6 +12,8 @@ scenes and metrics alone.
 
 from __future__ import annotations
 
+from importlib.util import find_spec as _find_spec
+
 from ._loader import load as _load
 
 _native, _problem = _load()
@@ -59,8 +61,8 @@ if _native is not None:
 else:
 
     def __getattr__(name: str) -> object:
-        if name.startswith("__") or name in ("scenes", "metrics", "images"):
-            raise AttributeError(name)
+        if name.startswith("__") or _find_spec(f"{__name__}.{name}") is not None:
+            raise AttributeError(name)  # a submodule: Python goes on and imports it
         raise ImportError(f"afterglow.{name} needs the native module. {_problem}")
 
 

@@ -29,8 +29,8 @@ def write_script(folder: Path, text: str) -> Path:
 
 @pytest.fixture
 def in_blender(blender: Callable[..., Any], tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    """in_blender(text, file=None, *arguments): runs the text in Blender in the background; what it gave to `result`, and
-    under "output" what Blender printed."""
+    """in_blender(text, file=None, *arguments): runs the text in Blender in the background; what it gave to `result`,
+    and under "output" what Blender printed."""
 
     def run(text: str, file: Path | None = None, *arguments: str, **more: Any) -> dict[str, Any]:
         values = tmp_path / "result.json"
@@ -76,7 +76,7 @@ def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]
 
 @pytest.fixture
 def in_window(display: dict[str, str], library: Path, tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    """in_window(text, file=None): runs the text in Blender with a real window of 800 × 600 pixels; the text ends with
+    """in_window(text, file=None): runs the text in Blender with a real window of 800 by 600 pixels; the text ends with
     `drive(steps)`. Gives what it handed to `result`, and under "output" what Blender printed."""
 
     def run(text: str, file: Path | None = None, timeout: float = 120.0) -> dict[str, Any]:
@@ -87,11 +87,11 @@ def in_window(display: dict[str, str], library: Path, tmp_path: Path) -> Callabl
         command = [str(ROOT / "build" / "blender"), "--factory-startup", "--window-geometry", "0", "0"]
         command += [*map(str, SCREEN), *([str(file)] if file else []), "--python", str(script)]
         start = time.time()
-        ended = subprocess.run(
-            command, env=env, timeout=timeout, text=True, errors="replace", stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-        )
+        pipes = dict(stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
+        ended = subprocess.run(command, env=env, timeout=timeout, **pipes)
         if ended.returncode:
-            pytest.fail(f"Blender ended with {ended.returncode} after {time.time() - start:.0f} s:\n{ended.stdout[-6000:]}")
+            seconds = time.time() - start
+            pytest.fail(f"Blender ended with {ended.returncode} after {seconds:.0f} s:\n{ended.stdout[-6000:]}")
         found = json.loads(values.read_text()) if values.is_file() else {}
         return {**found, "output": ended.stdout}
 

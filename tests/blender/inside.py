@@ -42,8 +42,10 @@ def plain(value: Any) -> Any:
 
 
 def addon(name: str = "") -> Any:
-    """The add-on's module, or one inside it: its name differs between a legacy add-on and an extension."""
-    root = next(m for m in sorted(sys.modules) if m.endswith("render_afterglow") or m == "bl_ext.user_default.afterglow")
+    """The add-on's module, or one in it: its name differs between a legacy add-on and an extension."""
+    root = next(
+        m for m in sorted(sys.modules) if m.endswith("render_afterglow") or m == "bl_ext.user_default.afterglow"
+    )
     __import__(root + "." + name if name else root)
     return sys.modules[root + "." + name if name else root]
 

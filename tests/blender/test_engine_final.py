@@ -278,7 +278,7 @@ def test_cancel_is_obeyed_within_50_ms(in_blender: Run, box: Path) -> None:
         delays = []
         for trial in range(8):
             wish = time.perf_counter() + 0.35 + 0.04 * trial
-            native = final.NativeScene()
+            native = addon('native_scene').NativeScene()
             class Engine:
                 '''The render engine's face towards `final.run`, with a user who cancels.'''
                 is_preview = False

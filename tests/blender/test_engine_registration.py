@@ -15,8 +15,9 @@ def test_registers_and_leaves_nothing(in_blender: Run) -> None:
         import addon_utils
         name = addon().__name__
         def traces():
-            panels = [p.__name__ for p in bpy.types.Panel.__subclasses__() if 'AFTERGLOW' in getattr(p, 'COMPAT_ENGINES', ())]
-            handlers = [f.__module__ for group in (bpy.app.handlers.load_pre, bpy.app.handlers.load_post) for f in group]
+            panels = [p.__name__ for p in bpy.types.Panel.__subclasses__()
+                      if 'AFTERGLOW' in getattr(p, 'COMPAT_ENGINES', ())]
+            handlers = [f.__module__ for f in [*bpy.app.handlers.load_pre, *bpy.app.handlers.load_post]]
             return dict(panels=panels, scene=hasattr(bpy.types.Scene, 'afterglow'),
                         engines=[e.bl_idname for e in bpy.types.RenderEngine.__subclasses__()],
                         handlers=[m for m in handlers if 'afterglow' in m])
@@ -29,7 +30,9 @@ def test_registers_and_leaves_nothing(in_blender: Run) -> None:
         """
     )
     assert found["with_it"]["scene"] and "AFTERGLOW" in found["with_it"]["engines"]
-    assert {"DATA_PT_lens", "RENDER_PT_color_management", "AFTERGLOW_RENDER_PT_sampling"} <= set(found["with_it"]["panels"])
+    assert {"DATA_PT_lens", "RENDER_PT_color_management", "AFTERGLOW_RENDER_PT_sampling"} <= set(
+        found["with_it"]["panels"]
+    )
     assert not found["without"]["scene"] and not found["without"]["handlers"]
     assert [name for name in found["without"]["panels"] if not name.startswith("AFTERGLOW")] == []
     assert found["again"]["scene"] and sorted(found["again"]["panels"]) == sorted(found["with_it"]["panels"])
@@ -43,7 +46,8 @@ def test_settings_have_cycles_names_and_meanings(in_blender: Run) -> None:
                   'caustics_reflective', 'caustics_refractive', 'filter_width', 'film_exposure', 'pixel_filter_type',
                   'sample_clamp_direct']
         result(shared={n: [getattr(ours, n), getattr(theirs, n)] for n in shared},
-               clamp=ours.sample_clamp_indirect, described=[p.identifier for p in ours.bl_rna.properties if not p.description],
+               clamp=ours.sample_clamp_indirect,
+               described=[p.identifier for p in ours.bl_rna.properties if not p.description],
                methods={i.identifier: i.value for i in ours.bl_rna.properties['method'].enum_items},
                known=[m['id'] for m in __import__('afterglow').method_descriptions()])
         """
@@ -65,7 +69,8 @@ def test_settings_survive_saving(in_blender: Run) -> None:
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         bpy.ops.wm.open_mainfile(filepath=path)
         own = bpy.context.scene.afterglow
-        result(engine=bpy.context.scene.render.engine, values=[own.method, own.samples, own.time_limit, own.diffuse_bounces],
+        result(engine=bpy.context.scene.render.engine,
+               values=[own.method, own.samples, own.time_limit, own.diffuse_bounces],
                version=own.file_version, current=addon('version_update').CURRENT)
         """
     )

@@ -3,9 +3,9 @@
 
 import bpy
 
-from . import information, presets
+from . import accuracy, information, presets
 
-_modules = (information, presets)
+_modules = (accuracy, information, presets)
 
 
 def register() -> None:
@@ -15,6 +15,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    accuracy.stop_all()
     for module in reversed(_modules):
         for operator in reversed(module.classes):
             bpy.utils.unregister_class(operator)

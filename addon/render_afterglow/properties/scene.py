@@ -193,6 +193,12 @@ def session_settings(scene: bpy.types.Scene, viewport: bool) -> dict[str, Any]:
     return settings
 
 
+def mist_settings(scene: bpy.types.Scene) -> tuple[float, float, str]:
+    """Start, depth and falloff of the mist pass; Blender's defaults where the scene has no world."""
+    mist = scene.world.mist_settings if scene.world is not None else None
+    return (mist.start, mist.depth, mist.falloff.lower()) if mist is not None else (5.0, 25.0, "quadratic")
+
+
 def register() -> None:
     AfterglowSceneSettings.__annotations__["method"] = EnumProperty(
         name="Method", description="How indirect light is computed", items=methods.method_items(), default="AUTO"

@@ -6,6 +6,7 @@ import bpy
 from bl_ui.utils import PresetPanel
 
 from .. import backend, store
+from ..operators import accuracy
 from ..operators.presets import QUALITY_ITEMS
 from ..properties import methods
 from .panel import PropertiesPanel, wrap
@@ -183,7 +184,8 @@ class AFTERGLOW_RENDER_PT_statistics(PropertiesPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         statistics = store.statistics(context.scene)
-        layout.operator("afterglow.copy_information")
+        accuracy.draw_progress(layout, lambda place: place.operator("afterglow.accuracy_chart", icon="GRAPH"))
+        layout.operator("afterglow.copy_information", icon="COPYDOWN")
         if statistics is None:
             layout.label(text="Nothing was rendered yet", icon="INFO")
             return

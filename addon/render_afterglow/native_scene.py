@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A native scene with what keeps it equal to Blender's depsgraph: final renders, viewports and the accuracy chart
+have one each."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import backend
+from .sync import SceneSync
+
+
+class NativeScene:
+    """A native scene, what keeps it equal to the depsgraph, and the warnings that it gave."""
+
+    def __init__(self) -> None:
+        self.warnings: list[str] = []
+        self.depsgraph = 0
+        self.scene = backend.afterglow.Scene()
+        self.sync = SceneSync(self.scene, self.log)
+
+    def log(self, level: str, text: str) -> None:
+        if level == "warning":
+            self.warnings.append(text)
+        else:
+            print("Afterglow:", text)
+
+    def sync_with(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Makes the native scene equal to the depsgraph; everything is read again where it is another one than
+        before."""
+        address = depsgraph.as_pointer()
+        self.sync.sync(depsgraph, full=address != self.depsgraph)
+        self.depsgraph = address
+
+    def take_warnings(self) -> list[str]:
+        taken, self.warnings[:] = list(dict.fromkeys(self.warnings)), []
+        return taken
