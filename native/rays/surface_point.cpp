@@ -89,7 +89,9 @@ SurfacePoint surface_point(const Scene& scene, const Ray& ray, const Hit& hit, b
   const Affine& m = record.to_world;
   const Vec3 bound = glm::abs(m.x) * terms.x + glm::abs(m.y) * terms.y + glm::abs(m.z) * terms.z + glm::abs(m.p) +
                      glm::abs(point.position);
-  point.error = kRoundings * kEpsilon * glm::dot(glm::abs(point.face_normal), bound);
+  // The next ray's own test rounds relative to its triangle's size, even where the plane is exact (z = 0).
+  const float size = std::sqrt(std::fmax(glm::dot(m.vector(e1), m.vector(e1)), glm::dot(m.vector(e2), m.vector(e2))));
+  point.error = kRoundings * kEpsilon * (glm::dot(glm::abs(point.face_normal), bound) + 0.25f * size);
 
   point.backfacing = glm::dot(point.face_normal, ray.direction) > 0.0f;
   point.normal = smooth_normal(record, mesh, point, vertex);
