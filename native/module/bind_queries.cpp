@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/sampler.h"
+#include "lights/camera.h"
 #include "module/queries.h"
 #include "rays/measure_rays.h"
 #include "rays/surface_point.h"
@@ -104,6 +105,120 @@ py::array_t<bool> occluded(const PyScene& self, const py::handle& origins, const
   return out;
 }
 
+template <int n>
+struct Rows {  // (N, n) floats of an answer
+  py::array_t<float> array;
+  float* to;
+  explicit Rows(size_t count) : array({py::ssize_t(count), py::ssize_t(n)}), to(array.mutable_data()) {}
+  template <class Vector>
+  void set(size_t row, const Vector& v) {
+    for (int k = 0; k < n; ++k) to[row * n + size_t(k)] = v[k];
+  }
+};
+
+/// Everything that surface_point and offset_origin say about the closest hits; positions in absolute coordinates.
+py::dict surface(const PyScene& self, const py::handle& origins, const py::handle& directions) {
+  const RayInput in = ray_input(origins, directions, "directions");
+  const auto n = py::ssize_t(in.count);
+  Rows<3> face(in.count), normal(in.count);
+  Rows<2> uv(in.count);
+  py::array_t<double> position({n, py::ssize_t(3)}), above({n, py::ssize_t(3)}), below({n, py::ssize_t(3)});
+  py::array_t<uint32_t> material(n);
+  py::array_t<bool> backfacing(n), valid(n);
+  const auto lock = reading(self);
+  const Scene& scene = self.core->scene;
+  const std::vector<Ray> rays = rays_of(in, scene.origin(), false);
+  for (py::ssize_t i = 0; i < n; ++i) {
+    Hit hit;
+    SurfacePoint point;
+    valid.mutable_at(i) = self.core->rays.closest(rays[size_t(i)], hit);
+    if (hit.valid()) point = surface_point(scene, rays[size_t(i)], hit, true);
+    face.set(size_t(i), point.face_normal);
+    normal.set(size_t(i), point.normal);
+    uv.set(size_t(i), point.uv);
+    const Vec3 up = offset_origin(point, point.face_normal), down = offset_origin(point, -point.face_normal);
+    for (int k = 0; k < 3; ++k) {
+      position.mutable_at(i, k) = double(point.position[k]) + scene.origin()[k];
+      above.mutable_at(i, k) = double(up[k]) + scene.origin()[k];
+      below.mutable_at(i, k) = double(down[k]) + scene.origin()[k];
+    }
+    material.mutable_at(i) = scene.material_handles()[point.material];
+    backfacing.mutable_at(i) = point.backfacing;
+  }
+  py::dict out;
+  out["valid"] = valid;
+  out["position"] = position;
+  out["above"] = above;
+  out["below"] = below;
+  out["face_normal"] = face.array;
+  out["normal"] = normal.array;
+  out["uv"] = uv.array;
+  out["material"] = material;
+  out["backfacing"] = backfacing;
+  return out;
+}
+
+/// The committed camera's rays through N places of an image.
+py::dict camera_rays(const PyScene& self, const py::handle& pixels, const py::handle& lens, uint32_t width,
+                     uint32_t height) {
+  const auto at = numbers<float>(pixels, "pixels", 2), on = numbers<float>(lens, "lens", 2);
+  const size_t n = size_t(at.shape(0));
+  if (on.shape(0) != at.shape(0)) throw InvalidInput("there must be as many lens points as pixels");
+  const auto lock = reading(self);
+  const Scene& scene = self.core->scene;
+  const CameraRays camera(scene.camera(), scene.origin(), width, height);
+  Rows<3> origin(n), direction(n), origin_dx(n), origin_dy(n), direction_dx(n), direction_dy(n);
+  Rows<2> range(n);
+  for (size_t i = 0; i < n; ++i) {
+    const CameraRay ray =
+        camera.ray({at.data()[2 * i], at.data()[2 * i + 1]}, {on.data()[2 * i], on.data()[2 * i + 1]});
+    origin.set(i, ray.ray.origin);
+    direction.set(i, ray.ray.direction);
+    origin_dx.set(i, ray.origin_dx);
+    origin_dy.set(i, ray.origin_dy);
+    direction_dx.set(i, ray.direction_dx);
+    direction_dy.set(i, ray.direction_dy);
+    range.set(i, Vec2(ray.ray.t_min, ray.ray.t_max));
+  }
+  py::dict out;
+  out["origin"] = origin.array;
+  out["direction"] = direction.array;
+  out["origin_dx"] = origin_dx.array;
+  out["origin_dy"] = origin_dy.array;
+  out["direction_dx"] = direction_dx.array;
+  out["direction_dy"] = direction_dy.array;
+  out["range"] = range.array;
+  return out;
+}
+
+py::dict changes_since(const PyScene& self, uint64_t version) {
+  const auto lock = reading(self);
+  const SceneChanges c = self.core->scene.changes_since(version);
+  std::vector<Handle> moved, deformed;
+  for (const MovedInstance& move : c.instances_moved) (move.deformed ? deformed : moved).push_back(move.instance);
+  py::dict out;
+  out["version"] = c.version;
+  for (const auto& [name, flag] : {std::pair("everything", c.everything), std::pair("camera", c.camera),
+                                   std::pair("world", c.world), std::pair("origin", c.origin)})
+    out[name] = flag;
+  const std::pair<const char*, const std::vector<Handle>*> lists[] = {
+      {"meshes_added", &c.meshes_added},         {"meshes_deformed", &c.meshes_deformed},
+      {"meshes_replaced", &c.meshes_replaced},   {"meshes_removed", &c.meshes_removed},
+      {"instances_added", &c.instances_added},   {"instances_removed", &c.instances_removed},
+      {"instances_edited", &c.instances_edited}, {"instances_moved", &moved},
+      {"instances_deformed", &deformed},         {"materials_added", &c.materials_added},
+      {"materials_edited", &c.materials_edited}, {"materials_removed", &c.materials_removed},
+      {"lights_added", &c.lights_added},         {"lights_edited", &c.lights_edited},
+      {"lights_removed", &c.lights_removed},     {"images_edited", &c.images_edited},
+  };
+  for (const auto& [name, list] : lists) {
+    py::list handles;
+    for (const Handle handle : *list) handles.append(handle);
+    out[name] = handles;
+  }
+  return out;
+}
+
 py::dict measure(const PyScene& self, const py::handle& origins, const py::handle& directions, const std::string& kind,
                  int rounds) {
   if (kind != "closest" && kind != "occluded")
@@ -196,6 +311,14 @@ py::array_t<float> sobol_points(py::ssize_t count, py::ssize_t dimensions, uint3
 void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>& scene) {
   scene.def("intersect", &intersect, py::arg("origins"), py::arg("directions"))
       .def("occluded", &occluded, py::arg("origins"), py::arg("targets"))
+      .def("surface", &surface, py::arg("origins"), py::arg("directions"))
+      .def("camera_rays", &camera_rays, py::arg("pixels"), py::arg("lens"), py::arg("width"), py::arg("height"))
+      .def("changes_since", &changes_since, py::arg("version"))
+      .def_property_readonly("origin",
+                             [](const PyScene& self) {
+                               const DVec3 o = self.core->scene.origin();
+                               return py::make_tuple(o.x, o.y, o.z);
+                             })
       .def_property_readonly("version", [](const PyScene& self) { return self.core->scene.version(); })
       .def_property_readonly("bounds", &bounds)
       .def_property_readonly("bytes", &bytes);

@@ -121,8 +121,8 @@ void take_faces(Mesh& mesh, const Columns& c, const std::string& owner) {
   if (c.materials.rows && triangles) {
     std::vector<uint32_t> slots = take<uint32_t>(c.materials);
     for (uint32_t& slot : slots) slot = std::min(slot, 0xffffu);
-    if (!all_equal_to<uint32_t>(slots, 0))
-      mesh.slots = per_triangle<uint16_t>(slots, faces, triangles, owner + ": materials");
+    mesh.slots = per_triangle<uint16_t>(slots, faces, triangles, owner + ": materials");
+    if (all_equal_to<uint16_t>(mesh.slots, 0)) mesh.slots = {};
   }
   const bool asked = std::any_of(c.attributes.begin(), c.attributes.end(),
                                  [](const AttributeColumn& a) { return a.domain == Domain::kFace; });

@@ -155,7 +155,12 @@ class Scene:
         scene units; "panorama" (equirectangular): panorama (longitude min, max, latitude min, max). The camera looks along
         its local −z, y up. The window is stretched over the full image; border and shift are the caller's arithmetic
         (RenderSettings.region renders a part)."""
-    def commit(self) -> Changes: ...
+    def commit(self, flatten: bool | None = None) -> Changes:
+        """flatten: meshes that one instance alone uses stand in the top-level BVH by themselves from now on: faster rays,
+        slower edits. For final renders. None: as before."""
+    def changes_since(self, version: int) -> dict[str, Any]:
+        """Handles of what changed in the commits after `version`, by kind (meshes_added, instances_moved, …), and the flags
+        everything (the log is too short to tell), camera, world, origin."""
     @property
     def version(self) -> int: ...
     @property
@@ -165,6 +170,15 @@ class Scene:
     def intersect(self, origins: NDArray[np.float64], directions: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
         """Closest hits of N rays: distance (inf: none), instance, triangle, barycentric (N, 2), normal (N, 3)."""
     def occluded(self, origins: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.bool_]: ...
+    @property
+    def origin(self) -> tuple[float, float, float]: ...  # what kernels' 32-bit coordinates are relative to
+    def surface(self, origins: NDArray[np.float64], directions: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+        """What renderers know about closest hits: valid, position, face_normal, normal, uv, material, backfacing, and where
+        the next ray would start `above` and `below` the face."""
+    def camera_rays(self, pixels: NDArray[np.float32], lens: NDArray[np.float32], width: int, height: int
+                    ) -> dict[str, NDArray[np.float32]]:
+        """Rays of the camera through (N, 2) places in pixels with (N, 2) lens samples, relative to `origin`: origin,
+        direction, their differentials a pixel (origin_dx, …), range (nearest and furthest distance)."""
 
 class Session:
     """One background render that can be asked, changed, paused and cancelled from any thread."""
@@ -222,4 +236,8 @@ def light_sample(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.fl
 def light_density(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32], direction: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
     """What rays meet, as a surface's own samples would: distance, radiance (N, 3), and the density with which light_sample
     chooses the same direction on what was met (nearest light or surface; else suns and world together)."""
+def measure_rays(scene: Scene, origins: NDArray[np.float64], directions: NDArray[np.float64], kind: str = "closest",
+                 rounds: int = 8) -> dict[str, Any]:
+    """Seconds of all rays on one thread, through native/rays (wrapped) and by bare Embree calls (bare), in alternating
+    pairs. kind "closest", or "occluded": then directions are targets."""
 def sobol(count: int, dimensions: int, seed: int) -> NDArray[np.float32]: ...
