@@ -48,6 +48,7 @@ def render(engine: bpy.types.RenderEngine, depsgraph: bpy.types.Depsgraph) -> No
             error, getattr(backend.afterglow, "Error", RefusedError)
         ):
             traceback.print_exc()
+        print(f"Afterglow: error: {error}")
         engine.error_set(f"Afterglow: {error}")
         store.forget(scene)
         try:

@@ -57,7 +57,7 @@ def make_property(setting: dict[str, Any]) -> Any:
             common[bound] = setting[bound]
     if kind == "int":
         return bpy.props.IntProperty(default=int(setting["default"]), **common)
-    if kind == "string":
+    if kind in ("str", "string"):
         return bpy.props.StringProperty(
             default=str(setting["default"]), name=common["name"], description=common["description"]
         )

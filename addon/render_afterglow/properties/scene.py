@@ -193,10 +193,15 @@ def session_settings(scene: bpy.types.Scene, viewport: bool) -> dict[str, Any]:
     return settings
 
 
-def mist_settings(scene: bpy.types.Scene) -> tuple[float, float, str]:
+MIST_FALLOFFS = ("QUADRATIC", "LINEAR", "INVERSE_QUADRATIC")
+
+
+def mist_settings(scene: bpy.types.Scene) -> tuple[float, float, int]:
     """Start, depth and falloff of the mist pass; Blender's defaults where the scene has no world."""
-    mist = scene.world.mist_settings if scene.world is not None else None
-    return (mist.start, mist.depth, mist.falloff.lower()) if mist is not None else (5.0, 25.0, "quadratic")
+    if scene.world is None:
+        return 5.0, 25.0, 0
+    mist = scene.world.mist_settings
+    return mist.start, mist.depth, MIST_FALLOFFS.index(mist.falloff)
 
 
 def register() -> None:
