@@ -21,7 +21,6 @@ for path in files:
         continue
     depsgraph = bpy.context.evaluated_depsgraph_get()
     depsgraph.update()
-    print("FILE", path, flush=True)
     scene = RecordingScene()
     keeper = sync.SceneSync(scene)
     start = time.perf_counter()

@@ -7,7 +7,7 @@ mesh that several objects share (none of them modifies it) is at one address in 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
@@ -44,7 +44,8 @@ class MeshEntry:
     address: int
     fingerprint: tuple[int, ...]
     names: frozenset[str]       # attributes that it has and that were asked for
-    topology: int | None = None
+    topology: int | None = None     # checksums, made when it is read a second time
+    shape: int | None = None
 
 
 @dataclass
@@ -237,10 +238,11 @@ class ObjectTable:
                 continue
             if known is None:
                 known = self.meshes.get(use.key)
-                if known is not None and (id(known) in claimed or (known.handle is None)):
+                if known is not None and id(known) in claimed:
                     known = None
             if known is not None:
                 claimed.add(id(known))
+                known = None if known.handle is None else known
             result[address] = self._read_mesh(use, address, names, known)
         return result
 
@@ -273,14 +275,18 @@ class ObjectTable:
         return entry
 
     def _store_mesh(self, entry: MeshEntry, known: MeshEntry | None, arguments: dict[str, Any], name: str) -> None:
-        self.report.meshes += 1
+        """Adds a mesh, deforms it where only points and normals differ, does nothing where nothing does."""
         if known is None:
+            self.report.meshes += 1
             entry.handle = self.scene.add_mesh(name=name, **arguments)
             return
-        entry.topology = topology(arguments)
-        if known.topology == entry.topology:
-            arguments = {key: arguments[key] for key in ("positions", "corner_normals", "vertex_normals") if key in arguments}
-        self.scene.set_mesh(entry.handle, **arguments)
+        points = {key: arguments[key] for key in ("positions", "corner_normals", "vertex_normals") if key in arguments}
+        entry.topology, entry.shape = topology(arguments), checksum(points.values())
+        same = known.topology == entry.topology
+        if same and known.shape == entry.shape:
+            return
+        self.report.meshes += 1
+        self.scene.set_mesh(entry.handle, **(points if same else arguments))
 
     # -- groups
 
@@ -352,13 +358,17 @@ def fingerprint_of(use: MeshUse) -> tuple[int, ...]:
     return (0,) if use.maker is not None else fingerprint(use.data)
 
 
-def topology(arguments: dict[str, Any]) -> int:
-    """A checksum of everything in a mesh but its positions and normals."""
-    arrays = [arguments["triangles"], arguments.get("corners"), arguments.get("faces"), arguments.get("materials"),
-              arguments.get("smooth"), *arguments["uvs"].values(), *(values for _, values in arguments["attributes"].values())]
-    sign = zlib.crc32(repr((list(arguments["uvs"]), arguments["active_uv"], list(arguments["attributes"]), len(arguments["positions"]),
-                            arguments["active_color"], "corner_normals" in arguments, "vertex_normals" in arguments)).encode())
+def checksum(arrays: Iterable[NDArray[Any] | None], start: int = 0) -> int:
     for array in arrays:
         if array is not None:
-            sign = zlib.crc32(np.ascontiguousarray(array).view(np.uint8).reshape(-1), sign)
-    return sign
+            start = zlib.crc32(np.ascontiguousarray(array).view(np.uint8).reshape(-1), start)
+    return start
+
+
+def topology(arguments: dict[str, Any]) -> int:
+    """A checksum of everything in a mesh but its positions and normals."""
+    names = ("triangles", "corners", "faces", "materials", "smooth")
+    words = repr((list(arguments["uvs"]), arguments["active_uv"], list(arguments["attributes"]), arguments["active_color"],
+                  len(arguments["positions"]), [name in arguments for name in ("corner_normals", "vertex_normals")]))
+    return checksum([*(arguments.get(name) for name in names), *arguments["uvs"].values(),
+                     *(values for _, values in arguments["attributes"].values())], zlib.crc32(words.encode()))
