@@ -23,8 +23,12 @@ NamedValue named_value(const std::string& name, const py::handle& value) {
     const py::list items(py::reinterpret_borrow<py::object>(value));
     if (items.empty()) return std::vector<double>{};
     try {
-      if (py::isinstance<py::str>(items[0])) return items.cast<std::vector<std::string>>();
-      return items.cast<std::vector<double>>();
+      bool words = false;  // one text among them makes all of them texts
+      for (const py::handle& item : items) words |= py::isinstance<py::str>(item);
+      if (!words) return items.cast<std::vector<double>>();
+      std::vector<std::string> texts;
+      for (const py::handle& item : items) texts.push_back(py::str(item).cast<std::string>());
+      return texts;
     } catch (const py::cast_error&) {
     }
   }

@@ -25,7 +25,7 @@ InstanceMask local_view_mask(const Scene& scene, const std::vector<uint32_t>& ha
 
 void Session::render_passes(const RenderSettings& settings, Renderer& renderer, Film& film) {
   Work work{.stop = StopToken(&stop_),
-            .seed = uint64_t(settings.seed) ^ (std::bit_cast<uint64_t>(settings.frame) * 0x9e3779b97f4a7c15ull),
+            .seed = uint64_t(settings.seed),
             .threads = settings.threads,
             .pause = &paused_,
             .samples_done = &samples_done_};

@@ -64,9 +64,19 @@ uint32_t choice(const std::string& name, const NamedValue& value, const std::vec
 }
 
 void set_mist(FilmSettings& film, const std::string& name, const NamedValue& value) {
-  const std::vector<double> v = numbers(name, value, 3);
-  if (!(v[0] >= 0.0) || !(v[1] >= 0.0) || !std::isfinite(v[0]) || !std::isfinite(v[1]) || !(v[2] >= 0.0 && v[2] <= 2.0))
-    wrong(name, "(start, depth, falloff): two lengths, then 0 quadratic, 1 linear, 2 inverse quadratic");
+  const auto bad = [&] { wrong(name, "(start, depth, 'quadratic', 'linear' or 'inverse_quadratic')"); };
+  std::vector<double> v;
+  if (const auto* words = std::get_if<std::vector<std::string>>(&value); words && words->size() == 3) {
+    const std::vector<std::string> falloffs = {"quadratic", "linear", "inverse_quadratic"};
+    const auto falloff = std::find(falloffs.begin(), falloffs.end(), (*words)[2]);
+    if (falloff == falloffs.end()) bad();
+    char* end = nullptr;
+    for (size_t i = 0; i < 2; ++i) v.push_back(std::strtod((*words)[i].c_str(), &end));
+    v.push_back(double(falloff - falloffs.begin()));
+  } else {
+    v = numbers(name, value, 3);
+  }
+  if (!(v[0] >= 0.0 && v[0] < 1e30) || !(v[1] >= 0.0 && v[1] < 1e30) || !(v[2] >= 0.0 && v[2] <= 2.0)) bad();
   film.mist_start = float(v[0]), film.mist_depth = float(v[1]), film.mist_falloff = uint8_t(v[2]);
 }
 

@@ -190,7 +190,7 @@ class Session:
         sample_clamp_direct sample_clamp_indirect (0: off) caustics_reflective caustics_refractive
         pixel_filter "BLACKMAN_HARRIS"|"GAUSSIAN"|"BOX", filter_width; film_transparent; film_exposure
         passes: names of the passes to keep (below); denoise: bool; denoiser "AUTO"|…
-        viewport: bool (start coarse: passes at 1/8, 1/4, 1/2 of the resolution first); mist (start, depth, falloff)
+        viewport: bool (start coarse: passes at 1/8, 1/4, 1/2 of the resolution first); mist (start, depth, "quadratic"|"linear"|"inverse_quadratic")
         local_view: instance handles that this view shows, or None."""
     def start(self) -> None: ...
     def wait(self, timeout: float = ...) -> bool: ...   # True: finished (or failed: raises)
