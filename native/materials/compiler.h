@@ -15,8 +15,8 @@ namespace afterglow {
 
 /// What the compiler asks of its surroundings.
 struct CompileHost {
-  /// Number of an image to be read with these parameters; kNone: none such (magenta).
-  std::function<uint32_t(int64_t image, uint32_t interpolation, uint32_t extension, uint32_t projection)> image;
+  /// Number of an image; kNone: none such (magenta).
+  std::function<uint32_t(int64_t handle)> image;
   std::function<uint32_t(const std::string& name)> attribute;  // a number for a mesh attribute or UV map of this name
   std::function<void(const std::string& text)> warn;           // may be called often with the same text
   bool fold = true;                                            // off: everything runs at the hit (tests)

@@ -101,5 +101,8 @@ std::unordered_map<std::string, Handler>& handlers();
 void register_math_nodes(std::unordered_map<std::string, Handler>&);
 void register_input_nodes(std::unordered_map<std::string, Handler>&);
 void register_texture_nodes(std::unordered_map<std::string, Handler>&);
+void register_pattern_nodes(std::unordered_map<std::string, Handler>&);
+/// Where a texture looks when nothing is linked: generated coordinates, or the UV map; then the node's own mapping.
+Operand texture_coordinates(Emitter&, bool uv);
 
 }  // namespace afterglow

@@ -190,6 +190,11 @@ void execute(const Program& program, const HitContext& hit, Vec3* r, Surface* ou
         break;
       }
       case Op::kMapping: result = run_mapping(in.u(1), a, b, c, in.v(0)); break;
+      case Op::kMatrix:
+        for (int k = 0; k < 3; ++k) {
+          result[k] = in.p(4 * k) * a.x + in.p(4 * k + 1) * a.y + in.p(4 * k + 2) * a.z + in.p(4 * k + 3);
+        }
+        break;
       case Op::kVectorRotate: result = run_vector_rotate(in.u(1), in.u(2) != 0, a, b, c, in.f(0)); break;
       case Op::kBlackbody: result = blackbody(a.x); break;
       case Op::kWavelength: result = wavelength(a.x); break;
@@ -207,7 +212,7 @@ void execute(const Program& program, const HitContext& hit, Vec3* r, Surface* ou
       }
       case Op::kNoise: case Op::kVoronoi: case Op::kWave: case Op::kGradient: case Op::kMagic: case Op::kBrick:
       case Op::kWhiteNoise: case Op::kGabor: case Op::kSky: case Op::kImage: case Op::kEnvironment:
-        result = run_texture(ins, Operands{r, constants, pool + ins.data}, hit, &second);
+        result = run_texture(ins, in, hit, &second);
         break;
       default: result = read_hit(ins, in, hit, &second);
     }
@@ -257,10 +262,14 @@ void run(const Program& program, HitContext& hit, Surface& out) {
       std::byte bytes[kMaxRegisters * sizeof(Vec3)];
     };
   } room;
-  SurfacePoint moved[2];
   hit.points[1] = hit.points[2] = hit.points[0];
-  if (program.reads_offsets && !hit.background) move_points(hit, moved);
-  execute(program, hit, room.registers, &out);
+  if (program.reads_offsets && !hit.background) {
+    SurfacePoint moved[2];
+    move_points(hit, moved);
+    execute(program, hit, room.registers, &out);
+  } else {
+    execute(program, hit, room.registers, &out);
+  }
   float sum = 0.0f;
   for (int k = 0; k < out.count; ++k) sum += out.lobes[k].sampling_weight;
   if (out.count == 1 && sum > 0.0f) {

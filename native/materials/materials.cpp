@@ -10,6 +10,7 @@
 #include "base/sampler.h"
 #include "materials/attributes.h"
 #include "materials/compiler.h"
+#include "materials/images.h"
 #include "scene/changes.h"
 
 namespace afterglow {
@@ -38,6 +39,7 @@ struct Materials::State {
   bool has_world = false;
   std::unordered_map<Handle, Program> lights;
   AttributeTables attributes;
+  Images images;
   std::set<std::string> said;
 
   void say(const std::string& text, std::vector<std::string>& warnings) {
@@ -47,6 +49,7 @@ struct Materials::State {
     CompileHost host;
     host.warn = [this, owner, &warnings](const std::string& text) { say(owner + ": " + text, warnings); };
     host.attribute = [this](const std::string& name) { return attributes.number(name); };
+    host.image = [this](int64_t handle) { return images.number(Handle(handle)); };
     return host;
   }
   Compiled compile_material(const Scene&, Handle, std::vector<std::string>&);
@@ -56,6 +59,7 @@ struct Materials::State {
     hit.path = &path;
     hit.scene = &scene;
     hit.attributes = &attributes;
+    hit.images = &images;
     return hit;
   }
   const Compiled& at(uint32_t material) const { return materials[material < materials.size() ? material : 0]; }
@@ -64,7 +68,7 @@ struct Materials::State {
 namespace {
 
 /// Emission of points spread over UV and generated coordinates: what light selection goes by.
-Rgb estimate_emission(const Program& program) {
+Rgb estimate_emission(const Program& program, const Images& images) {
   if (program.empty) return Rgb(0.0f);
   if (program.folded) return program.ready.emission;
   Rgb sum(0.0f);
@@ -77,6 +81,7 @@ Rgb estimate_emission(const Program& program) {
     HitContext hit;
     hit.points[0] = &point;
     hit.path = &path;
+    hit.images = &images;
     surface.clear();
     run(program, hit, surface);
     sum += surface.emission;
@@ -97,7 +102,6 @@ Compiled Materials::State::compile_material(const Scene& scene, Handle handle, s
   result.transparency = compile(graph, ProgramKind::kTransparency, compile_host);
   result.emission = compile(graph, ProgramKind::kEmission, compile_host);
   if (material) result.pass_index = material->pass_index, result.emission_sampling = material->emission_sampling;
-  result.mean_emission = estimate_emission(result.emission);
   return result;
 }
 
@@ -111,9 +115,11 @@ void Materials::commit(const Scene& scene, const SceneChanges& changes, std::vec
   const bool everything = changes.everything || s.materials.empty() || !changes.images_edited.empty();
   const std::set<Handle> edited(changes.materials_edited.begin(), changes.materials_edited.end());
   s.materials.resize(handles.size());
+  std::vector<bool> fresh(handles.size(), false);
   for (size_t k = 0; k < handles.size(); ++k) {
     if (everything || s.materials[k].handle != handles[k] || edited.count(handles[k]) || s.materials[k].surface.code.empty()) {
       s.materials[k] = s.compile_material(scene, handles[k], warnings);
+      fresh[k] = true;
     }
   }
   if (everything || changes.world) {
@@ -129,6 +135,11 @@ void Materials::commit(const Scene& scene, const SceneChanges& changes, std::vec
       if (!light.graph) continue;
       s.lights[handle] = compile(*light.graph, ProgramKind::kEmission, s.host("light \"" + light.name + "\"", warnings));
     }
+  }
+  s.images.load(scene, warnings);
+  for (size_t k = 0; k < handles.size(); ++k) {
+    Compiled& m = s.materials[k];
+    if (everything || fresh[k]) m.mean_emission = estimate_emission(m.emission, s.images);
   }
   const bool geometry = !changes.meshes_added.empty() || !changes.meshes_replaced.empty() || !changes.meshes_removed.empty() ||
                         !changes.meshes_deformed.empty() || !changes.instances_added.empty() ||
@@ -215,6 +226,7 @@ Rgb Materials::world(const Vec3& direction, const PathContext& path) const {
   if (state_->world.folded) return state_->world.ready.emission;
   HitContext hit;
   hit.path = &path;
+  hit.images = &state_->images;
   return run_direction(state_->world, hit, direction, Vec2(0.0f));
 }
 
@@ -229,6 +241,7 @@ Rgb Materials::light(Handle light, const Vec3& direction, const Vec2& uv) const 
   PathContext path;
   HitContext hit;
   hit.path = &path;
+  hit.images = &state_->images;
   return run_direction(found->second, hit, direction, uv);
 }
 
@@ -238,7 +251,7 @@ size_t Materials::bytes() const {
     return p.code.size() * sizeof(Instruction) + p.constants.size() * sizeof(Vec3) + p.pool.size() * 4 + sizeof p;
   };
   for (const Compiled& m : state_->materials) total += of(m.surface) + of(m.transparency) + of(m.emission);
-  return total + of(state_->world);
+  return total + of(state_->world) + state_->images.bytes();
 }
 
 }  // namespace afterglow

@@ -16,7 +16,7 @@ enum class Op : uint16_t {
   kLuminance, kAverage, kReplicate, kMath, kVectorMath, kMixFloat, kMixVector, kMixColor, kClamp, kMapRange, kMapVectorRange,
   kSeparate, kCombine, kRamp, kCurves, kHueSaturation, kGamma, kInvert, kBrightContrast, kMapping, kBlackbody, kWavelength,
   kNormalNode, kChecker, kNoise, kVoronoi, kWave, kGradient, kMagic, kBrick, kWhiteNoise, kGabor, kSky,
-  kVectorRotate, kOneMinus,
+  kVectorRotate, kOneMinus, kMatrix,
   // what reads the hit
   kFirstHitOp, kTexCoord = kFirstHitOp, kUv, kAttribute, kGeometry, kLightPath, kObjectInfo, kCamera, kNormalMap, kBump,
   kFresnel, kLayerWeight, kVectorTransform, kTangent, kWireframe, kImage, kEnvironment,
