@@ -87,7 +87,7 @@ def render_layer(
     if engine.test_break():
         return
     engine.update_stats("", prefix + "Building the scene")
-    changes = native.scene.commit()
+    changes = native.scene.commit(flatten=True)
     seconds["commit"] = time.perf_counter() - started - seconds["sync"]
     warnings = native.take_warnings() + list(view.warnings) + list(changes["warnings"])
 
