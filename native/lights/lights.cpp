@@ -189,6 +189,10 @@ float Lights::State::suns_weight(const Vec3& normal) const {
 }
 
 bool Lights::State::shares(const Vec3& position, const Vec3& normal, Shares& s) const {
+  if (suns.empty() && !(world_weight > 0.0f)) {  // nothing to choose between
+    s.weight[kTree] = finite() ? 1.0f : 0.0f;
+    return finite() > 0;
+  }
   s.weight[kTree] = tree.importance(position, normal);
   s.weight[kSuns] = suns_weight(normal);
   s.weight[kWorld] = world_weight;
