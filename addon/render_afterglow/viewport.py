@@ -14,13 +14,15 @@ import weakref
 from typing import Any
 
 import bpy
+import numpy as np
 
 from . import backend, display
 from .native_scene import NativeScene
 from .properties.scene import mist_settings, session_settings
-from .sync import sync_camera_view
+from .sync import CameraView, sync_camera_view
 from .sync.scene import viewport_shading
 
+_NOTHING = object()
 WATCH_SECONDS = 0.015  # how often the watcher looks for a newer picture
 REDRAW_SECONDS = 0.05  # between two redraws of a picture that refines slowly, at least
 
@@ -90,7 +92,7 @@ class Viewport:
         self.session: Any = None
         self.picture: display.Picture | None = None
         self.generation = -1
-        self.camera: Any = None
+        self.view: CameraView | None = None
         self.settings: dict[str, Any] = {}
         self.shading: Any = None  # scene's or studio's lights and world, as they were synced
         self.shown: tuple[Any, ...] | None = None  # what decides which objects this view shows, as it was last
@@ -130,12 +132,12 @@ class Viewport:
         self.shown = None
         if self.session is None:
             self._sync(context, depsgraph)
-            self._set_view(context, depsgraph)
+            self._start(context, depsgraph)
         else:
             with self.session.edit():
                 self._sync(context, depsgraph)
+                self._set_view(context, depsgraph)
                 self.native.scene.commit()
-            self._set_view(context, depsgraph)
             self.watcher.wake()
         for text in self.native.take_warnings():
             print("Afterglow:", text)
@@ -144,8 +146,16 @@ class Viewport:
         self.native.sync.sync(depsgraph, view=context.space_data)
         self.shading = viewport_shading(context.space_data)
 
-    def _set_view(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
-        """Starts the session or gives it the new view and settings, where these differ from the last ones."""
+    def _start(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        self.view, self.settings = self._wanted(context, depsgraph)
+        self.native.scene.set_camera(**self.view.camera)
+        self.native.scene.commit()
+        self.session = backend.afterglow.Session(self.native.scene, self.settings)
+        self.session.start()
+        self.watcher.watch(self.session)
+
+    def _wanted(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> tuple[CameraView, dict[str, Any]]:
+        """The view and the session's settings, as they are now in Blender."""
         scene, region, space = depsgraph.scene, context.region, context.space_data
         view = sync_camera_view(depsgraph, region, context.region_data, space, 1.0 / pixel_size(scene))
         settings = session_settings(scene, viewport=True)
@@ -157,29 +167,26 @@ class Viewport:
             mist=mist_settings(scene),
             local_view=self._local_view(space, depsgraph),
         )
-        key = (view.camera, view.width, view.height, view.region)
-        self.view = view
-        if self.session is None:
-            self.native.scene.set_camera(**view.camera)
-            self.native.scene.commit()
-            self.session = backend.afterglow.Session(self.native.scene, settings)
-            self.session.start()
-            self.watcher.watch(self.session)
-        else:
-            moved = not same_camera(key, self.camera)
-            relit = viewport_shading(space) != self.shading
-            if moved or relit:
-                with self.session.edit():
-                    if relit:
-                        self._sync(context, depsgraph)
+        return view, settings
+
+    def _set_view(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Gives the session the view and settings where these differ from the last ones; one restart for all of them."""
+        view, settings = self._wanted(context, depsgraph)
+        moved = not same_camera(view.camera, self.view.camera)
+        relit = viewport_shading(context.space_data) != self.shading
+        changed = {name: value for name, value in settings.items() if value != self.settings.get(name, _NOTHING)}
+        self.view, self.settings = view, settings
+        if moved or relit or changed:
+            with self.session.edit():
+                if relit:
+                    self._sync(context, depsgraph)
+                if moved:
                     self.native.scene.set_camera(**view.camera)
-                    self.native.scene.commit()
-            if settings != self.settings:
-                self.session.update(settings)
-            if moved or relit or settings != self.settings:
-                self.watcher.wake()
-        self.camera, self.settings = key, settings
-        self._pause(scene.afterglow.preview_pause)
+                if changed:
+                    self.session.update(changed)
+                self.native.scene.commit()
+            self.watcher.wake()
+        self._pause(depsgraph.scene.afterglow.preview_pause)
 
     def _local_view(self, space: bpy.types.SpaceView3D, depsgraph: bpy.types.Depsgraph) -> list[int] | None:
         """Handles of what this view shows; asked anew only after an edit or where the view's own choice changed."""
@@ -244,13 +251,11 @@ def pixel_size(scene: bpy.types.Scene) -> int:
     return int(setting)
 
 
-def same_camera(one: Any, other: Any) -> bool:
-    """Whether two views are equal; their transforms are arrays."""
-    if one is None or other is None or one[1:] != other[1:] or one[0].keys() != other[0].keys():
+def same_camera(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    """Whether two cameras are equal; their transforms are arrays."""
+    if one.keys() != other.keys():
         return False
-    return all(
-        (a == b).all() if hasattr(a, "all") else a == b for a, b in ((one[0][name], other[0][name]) for name in one[0])
-    )
+    return all(np.array_equal(one[name], other[name]) for name in one)
 
 
 def view_status(settings: dict[str, Any], progress: dict[str, Any]) -> str:

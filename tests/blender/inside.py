@@ -149,7 +149,7 @@ def viewport() -> Any:
     return found[-1] if found else None
 
 
-def settled(seconds: float = 20.0) -> Iterator[float]:
+def settled(seconds: float = 60.0) -> Iterator[float]:
     """`yield from settled()` waits until the viewport's session has finished and was drawn."""
     end = time.time() + seconds
     while time.time() < end:

@@ -68,6 +68,18 @@ def make_property(setting: dict[str, Any]) -> Any:
     )
 
 
+def tell_viewports(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """A changed setting reaches the viewports: Blender by itself tells them of changes by hand, not of a script's."""
+    group.id_data.update_tag()
+
+
+def tell_changes(group: type) -> None:
+    """Makes every setting of a group that is not registered yet tell the viewports when it changes."""
+    for setting in group.__annotations__.values():
+        if setting.function is not bpy.props.PointerProperty:
+            setting.keywords["update"] = tell_viewports
+
+
 def group_name(identifier: str) -> str:
     """Where a method's own settings live in `scene.afterglow`: `path_tracing` for PATH_TRACING."""
     return identifier.lower()
@@ -94,6 +106,7 @@ def register() -> None:
     from .scene import SHARED_SETTINGS
 
     for group in build_groups(SHARED_SETTINGS).values():
+        tell_changes(group)
         bpy.utils.register_class(group)
 
 

@@ -212,6 +212,7 @@ def register() -> None:
         AfterglowSceneSettings.__annotations__[name] = PointerProperty(
             type=group, name=name.replace("_", " ").title(), description="Settings of this method alone"
         )
+    methods.tell_changes(AfterglowSceneSettings)
     bpy.utils.register_class(AfterglowSceneSettings)
 
 
