@@ -2,6 +2,10 @@
 // numpy arrays as columns: see arrays.h.
 #include "module/arrays.h"
 
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
+
 namespace afterglow {
 
 namespace {
@@ -90,6 +94,15 @@ Column flag_column(const py::handle& value, const std::string& what) {
   if (!py::isinstance<py::array_t<bool>>(array) && !py::isinstance<py::array_t<uint8_t>>(array))
     array = converted<bool>(array, what);
   return column_of(array, what, 1, 1);
+}
+
+void expect_large_pages([[maybe_unused]] void* data, [[maybe_unused]] size_t bytes) {
+#if defined(__linux__)
+  constexpr uintptr_t page = uintptr_t(1) << 21;
+  const uintptr_t first = (reinterpret_cast<uintptr_t>(data) + page - 1) & ~(page - 1);
+  const uintptr_t last = (reinterpret_cast<uintptr_t>(data) + bytes) & ~(page - 1);
+  if (last > first) madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);  // a hint: may fail
+#endif
 }
 
 DMat4 matrix_from_python(const py::handle& value, const std::string& what) {

@@ -28,6 +28,9 @@ Column index_column(const py::handle& value, const std::string& what, size_t wid
 /// bool and uint8 as they are; other numbers become 0 or 1.
 Column flag_column(const py::handle& value, const std::string& what);
 
+/// Tells the system that this memory is about to be filled: page by page of 4 KB, filling costs more than copying.
+void expect_large_pages(void* data, size_t bytes);
+
 /// The column's values as a vector of Out (whole rows, or single items).
 template <class Out>
 std::vector<Out> take(const Column& column) {
@@ -36,6 +39,7 @@ std::vector<Out> take(const Column& column) {
   const size_t n = bytes / sizeof(Out);
   if (n == 0) return out;
   out.reserve(n + 16 / sizeof(Out) + 1);  // Embree may read 16 bytes beyond the last vertex
+  expect_large_pages(out.data(), bytes);
   if (column.contiguous() && reinterpret_cast<uintptr_t>(column.data) % alignof(Out) == 0) {
     const Out* first = reinterpret_cast<const Out*>(column.data);
     out.assign(first, first + n);

@@ -2,8 +2,10 @@
 // The wrapper against bare Embree calls: see measure_rays.h.
 #include "rays/measure_rays.h"
 
+#include <algorithm>
 #include <chrono>
 
+#include "base/errors.h"
 #include "base/parallel.h"
 #include "rays/ray_caster_state.h"
 
@@ -51,6 +53,8 @@ RayTimings measure_rays(const RayCaster& caster, std::span<const Ray> rays, bool
   const FlushDenormals flush;
   RTCScene scene = RayMeasurement::scene(caster);
   const std::vector<RTCRayHit> prepared = bare_rays(rays);
+  if (std::ranges::any_of(rays, [](const Ray& r) { return !is_finite(r.origin) || !is_finite(r.direction); }))
+    throw InvalidInput("measure_rays: all rays must be finite");
   RayTimings out;
   for (int round = 0; round < rounds; ++round) {
     out.hits_wrapped = out.hits_bare = 0;

@@ -3,16 +3,28 @@
 // through Embree (Wald et al. 2014), kept as thin as it can be.
 #include "rays/ray_caster.h"
 
+#include <cstddef>
+#include <cstring>
+
 #include "rays/ray_caster_state.h"
 
 namespace afterglow {
 
 namespace {
 
-/// Embree's answer to a non-finite ray is undefined; ours is: nothing is hit.
+using Lanes = float __attribute__((vector_size(16)));
+
+/// Embree's answer to a ray that is not finite, or further out than it can square, is undefined; ours is: nothing is
+/// hit. Origin and nearest distance, direction and furthest distance are compared four at a time.
 bool usable(const Ray& ray) {
-  const Vec3 zero = ray.origin * 0.0f + ray.direction * 0.0f;
-  return zero.x + zero.y + zero.z == 0.0f && ray.t_min <= ray.t_max;
+  static_assert(sizeof(Vec3) == 12 && offsetof(Ray, t_min) == 12 && offsetof(Ray, t_max) == 28);
+  constexpr float largest = 1.844e18f;
+  Lanes from, way;
+  std::memcpy(&from, &ray.origin, 16);
+  std::memcpy(&way, &ray.direction, 16);
+  const Lanes bound{largest, largest, largest, kInfinity};
+  const auto inside = (from <= bound) & (from >= -bound) & (way <= bound) & (way >= -bound);
+  return (inside[0] & inside[1] & inside[2] & inside[3]) && ray.t_min <= ray.t_max;
 }
 
 void fill(RTCRay& to, const Ray& ray) {
