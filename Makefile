@@ -93,6 +93,11 @@ test-quick:
 	@$(MAKE) --no-print-directory build PRESET=release
 	@$(PYTEST) -m "not slow" $(PYTEST_ARGS) $(TESTS)
 
+test-blenders:
+	@tools/setup.sh blenders
+	@$(MAKE) --no-print-directory build PRESET=release
+	@$(PYTHON) tools/blenders.py $(BLENDERS_ARGS)
+
 asan tsan:
 	@tools/setup.sh test
 	@$(MAKE) --no-print-directory native PRESET=$@

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every Blender that Afterglow promises to run in: `make test-blenders` calls it.
+
+The packaged extension is tested in official 4.2 LTS, 4.5 LTS and 5.0 (modules from PyPI), and the add-on, with the module built
+by the suite's own compiler and libraries, in Debian's 4.3.2 (trixie) and 5.2.2 (sid), windows included, in roots made by
+debootstrap under build/roots. Last, one picture from all of them is compared. Mounts live in a namespace of their own, so
+nothing stays mounted. Needs root."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import package  # noqa: E402
+import venvs  # noqa: E402
+
+ROOT = Path(__file__).resolve().parent.parent
+ROOTS = Path(os.environ.get("AFTERGLOW_ROOTS") or ROOT / "build" / "roots")
+PICTURES = ROOT / "build" / "blenders"
+MIRROR = "http://deb.debian.org/debian"
+PACKAGES = """blender python3-numpy g++ cmake ninja-build make git ccache pkg-config python3-dev pybind11-dev libtbb-dev
+    libembree-dev libglm-dev libopenimageio-dev libimath-dev libopenexr-dev libfmt-dev python3-pytest python3-pytest-xdist
+    python3-openimageio xvfb xauth xdotool imagemagick libgl1-mesa-dri libegl1 python3-cattr python3-requests""".split()
+SUITES = ("trixie", "sid")
+# Blender's own changes of meaning between releases may move the mean of a picture by this much; noise is far below.
+MEAN_TOLERANCE = 0.01
+
+
+def inside(suite: str, command: str, *, quiet: bool = False) -> int:
+    """Runs a shell command inside a suite's root, this project mounted at its own path; returns the exit code."""
+    root = ROOTS / suite
+    scenes = Path(os.environ.get("AFTERGLOW_SCENES") or ROOT.parent / "shared" / "scenes")
+    shared = [str(ROOT)] + ([str(scenes.resolve())] if scenes.is_dir() else [])
+    cache = Path(os.environ.get("CCACHE_DIR") or Path.home() / ".cache" / "ccache")
+    cache.mkdir(parents=True, exist_ok=True)
+    mounts = [f"mount -t proc proc {shlex.quote(str(root))}/proc", f"mount --rbind /dev {shlex.quote(str(root))}/dev"]
+    for path in [*shared, str(cache)]:
+        quoted = shlex.quote(path)
+        mounts.append(f"mkdir -p {shlex.quote(str(root))}{quoted} && mount --bind {quoted} {shlex.quote(str(root))}{quoted}")
+    environment = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/root", "LANG": "C.UTF-8", "CCACHE_DIR": str(cache),
+                   "DEBIAN_FRONTEND": "noninteractive", "AFTERGLOW_PRESET": suite, "AFTERGLOW_SCENES": str(scenes.resolve()),
+                   "AFTERGLOW_LIBRARY": str(ROOT / "build" / suite / "python")}
+    assigned = " ".join(f"{name}={shlex.quote(value)}" for name, value in environment.items())
+    script = f"cd {shlex.quote(str(ROOT))} && {command}"
+    line = " && ".join([*mounts, f"chroot {shlex.quote(str(root))} env -i {assigned} bash -c {shlex.quote(script)}"])
+    sink = subprocess.DEVNULL if quiet else None
+    return subprocess.run(["unshare", "--mount", "--propagation", "private", "bash", "-c", line], stdout=sink).returncode
+
+
+def make_root(suite: str) -> None:
+    """Debian's suite with Blender and the build's packages; made once."""
+    root = ROOTS / suite
+    if (root / ".complete").is_file():
+        return
+    print(f"Making {root} (about 2 GB)", flush=True)
+    shutil.rmtree(root, ignore_errors=True)
+    root.mkdir(parents=True)
+    subprocess.run(["debootstrap", "--variant=minbase", suite, str(root), MIRROR], check=True, stdout=subprocess.DEVNULL)
+    install = f"apt-get -q update >/dev/null && apt-get -qq install -y --no-install-recommends {' '.join(PACKAGES)}"
+    if inside(suite, install, quiet=True):
+        raise RuntimeError(f"the packages for {suite} could not be installed")
+    (root / ".complete").write_text(suite + "\n")
+
+
+def build(suite: str) -> None:
+    command = (f"cmake -G Ninja -B build/{suite} -DCMAKE_BUILD_TYPE=Release -DPython_EXECUTABLE=/usr/bin/python3 >/dev/null "
+               f"&& cmake --build build/{suite}")
+    if inside(suite, command):
+        raise RuntimeError(f"the module does not build on {suite}")
+
+
+def test(suite: str, selection: list[str]) -> bool:
+    tests = " ".join(map(shlex.quote, selection)) or "tests/native tests/blender"
+    return inside(suite, f"/usr/bin/python3 -m pytest -p no:cacheprovider {tests}") == 0
+
+
+def test_official(version: str) -> bool:
+    """The packaged extension in an official Blender, by the very test that `make test` runs for the others."""
+    python = venvs.ensure(version)
+    made = package.ensure()
+    folder = PICTURES / version
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    answer = folder / "answer.json"
+    script = ROOT / "tests" / "blender" / "package_inside.py"
+    command = [python, script, "--", made["extension"], ROOT / "blend_files" / "cornell_box.blend", answer, folder]
+    env = {name: value for name, value in os.environ.items() if name not in ("AFTERGLOW_LIBRARY", "PYTHONPATH")}
+    with (folder / "log.txt").open("w") as log:
+        subprocess.run(command, stdout=log, stderr=subprocess.STDOUT, env=env | {"BLENDER_USER_RESOURCES": str(folder / "user")})
+    if not answer.is_file():
+        print(f"official {version}: failed, see {folder}/log.txt")
+        return False
+    found = json.loads(answer.read_text())
+    good = found["cycles_unchanged"] and found["finite"] and abs(found["distance"] - 5) < 1e-5 and found["samples"] == 64
+    print(f"official {'.'.join(map(str, found['blender']))}: {'passed' if good else found}")
+    return good
+
+
+def render(name: str, command: str | list[str | Path], suite: str = "") -> Path | None:
+    """One picture of the comparison; None when the Blender fails."""
+    target = PICTURES / f"{name}.exr"
+    target.unlink(missing_ok=True)
+    if suite:
+        inside(suite, f"{command} >{shlex.quote(str(target.with_suffix('.log')))} 2>&1")
+    else:
+        with target.with_suffix(".log").open("w") as log:
+            subprocess.run([str(part) for part in command], stdout=log, stderr=subprocess.STDOUT)
+    if not target.is_file():
+        print(f"{name}: no picture, see {target.with_suffix('.log')}")
+        return None
+    return target
+
+
+def compare(scene: Path, suites: list[str], versions: list[str]) -> bool:
+    """Renders one scene everywhere with the same seed and samples, and prints how far each is from Debian's 3.4.1."""
+    script = ROOT / "tools" / "one_picture.py"
+    made = package.ensure()
+    pictures: dict[str, Path | None] = {}
+    wrapper = ROOT / "build" / "blender"
+    pictures["Debian 3.4.1"] = render("debian_3.4.1", [wrapper, "-b", scene, "--python", script, "--",
+                                                       PICTURES / "debian_3.4.1.exr"])
+    for version in versions:
+        name = f"official_{version}"
+        os.environ["AFTERGLOW_LIBRARY"] = str(made["library"])
+        pictures[f"official {version}"] = render(name, [venvs.ensure(version), script, "--", PICTURES / f"{name}.exr", scene])
+    os.environ.pop("AFTERGLOW_LIBRARY", None)
+    for suite in suites:
+        name = f"debian_{suite}"
+        line = " ".join(shlex.quote(str(part)) for part in [wrapper, "-b", scene, "--python", script, "--", PICTURES / f"{name}.exr"])
+        pictures[f"Debian {suite}"] = render(name, line, suite)
+    return report(pictures)
+
+
+def report(pictures: dict[str, Path | None]) -> bool:
+    import numpy as np
+    from OpenImageIO import ImageBuf
+
+    good = all(pictures.values())
+    arrays = {name: np.asarray(ImageBuf(str(path)).get_pixels(), np.float64)[..., :3] for name, path in pictures.items() if path}
+    base = next(iter(arrays.values()))
+    for name, pixels in arrays.items():
+        if pixels.shape != base.shape:
+            print(f"{name:16} another size: {pixels.shape}")
+            good = False
+            continue
+        mean = pixels.mean() / base.mean() - 1
+        relmse = ((pixels - base) ** 2 / (base ** 2 + 0.01)).mean()
+        fits = bool(np.isfinite(pixels).all()) and abs(mean) <= MEAN_TOLERANCE
+        good &= fits
+        print(f"{name:16} mean {pixels.mean():.5f} ({mean:+.3%})  relMSE {relmse:.2e}  {'' if fits else 'TOO FAR'}")
+    return good
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--suites", nargs="*", default=list(SUITES))
+    parser.add_argument("--official", nargs="*", default=list(venvs.RELEASES))
+    parser.add_argument("--scene", type=Path, default=ROOT / "blend_files" / "cornell_box.blend")
+    parser.add_argument("--only", choices=("official", "debian", "compare"), help="one of the three parts")
+    parser.add_argument("tests", nargs="*", help="what pytest runs in the roots")
+    arguments = parser.parse_args()
+    if os.geteuid():
+        print("make test-blenders: needs root, for debootstrap and chroot", file=sys.stderr)
+        return 2
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    failed = []
+    if arguments.only in (None, "official"):
+        failed += [f"official {version}" for version in arguments.official if not test_official(version)]
+    for suite in arguments.suites if arguments.only != "official" else []:
+        make_root(suite)
+        build(suite)
+        if arguments.only in (None, "debian") and not test(suite, arguments.tests):
+            failed.append(f"Debian {suite}")
+    if arguments.only in (None, "compare") and not compare(arguments.scene.resolve(), arguments.suites, arguments.official):
+        failed.append("the comparison of pictures")
+    print(f"failed: {', '.join(failed)}" if failed else "all Blenders passed")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
