@@ -2,16 +2,14 @@
 """Inside Blender: after every one of many random edits, what was synced step by step equals a fresh sync.
 
 Arguments after --: seed, number of edits."""
-import json
 import os
 import random
 import sys
-import traceback
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import bpy
 from recording_scene import RecordingScene
-from sync_tools import load_sync
+from sync_tools import finish, load_sync
 
 sync = load_sync()
 seed, edits = (int(x) for x in sys.argv[sys.argv.index("--") + 1:])
@@ -286,12 +284,7 @@ def run():
         bpy.context.view_layer.update()
         compare(bpy.context.evaluated_depsgraph_get(), f"edit {step}: {function.__name__} {said}; {state['last']}")
     calls = {name: recorded.calls.count(name) for name in sorted(set(recorded.calls))}
-    print("RESULT " + json.dumps({"edits": edits, "syncs": state["syncs"], "calls": calls}))
+    return {"edits": edits, "syncs": state["syncs"], "calls": calls}
 
 
-try:
-    run()
-except BaseException:
-    traceback.print_exc()
-    sys.stdout.flush()
-    os._exit(1)  # bpy 4.5 as a module hangs on the way out after an exception
+finish(run)

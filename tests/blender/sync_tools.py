@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What scripts inside Blender need to test the sync by itself: the package without the native module behind it."""
+import json
 import os
 import sys
+import traceback
 import types
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -18,6 +20,17 @@ def load_sync():
         with open(os.path.join(ADDON, "sync", "__init__.py"), encoding="utf8") as file:
             exec(compile(file.read(), "sync/__init__.py", "exec"), package.__dict__)
     return sys.modules["afterglow_sync"]
+
+
+def finish(work):
+    """Runs work() and prints what it returns. Leaves at once: Blender as a module may hang on its way out."""
+    try:
+        print("RESULT " + json.dumps(work()), flush=True)
+    except BaseException:
+        traceback.print_exc()
+        sys.stdout.flush()
+        os._exit(1)
+    os._exit(0)
 
 
 sys.path.insert(0, HERE)
