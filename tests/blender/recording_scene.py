@@ -83,7 +83,7 @@ class RecordingScene:
 
     # meshes
     def check_mesh(self, mesh):
-        corners = mesh["corners"]
+        corners = mesh["triangles"] if mesh["corners"] is None else mesh["corners"]
         assert mesh["triangles"].shape == corners.shape and corners.shape[1] == 3
         assert mesh["positions"].ndim == 2 and mesh["triangles"].max() < len(mesh["positions"]) and mesh["triangles"].min() >= 0
         if mesh.get("corner_normals") is not None:

@@ -132,7 +132,7 @@ class MaterialTable:
 
     def _matrix(self, ob: Any) -> list[list[float]]:
         self._reads_matrix = True
-        return [[float(x) for x in row] for row in ob.matrix_world]
+        return [[float(x) for x in row] for row in ob.matrix_world.inverted_safe()]
 
     # -- images
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import SRGB_TO_LINEAR, raw_view, read
+from .nodes import GENERATED
 
 DOMAINS = {"POINT": "vertex", "CORNER": "corner", "FACE": "face"}
 # data type of an attribute → (property, memory type, width, type of foreach_get)
@@ -128,7 +129,17 @@ def _read_attributes(mesh: Any, wanted: set[str]) -> tuple[dict[str, tuple[str, 
             field, dtype, width = ATTRIBUTES[attribute.data_type]
             values = read(attribute.data, field, dtype, width)
             result[name] = (DOMAINS[attribute.domain], np.asarray(values, np.float32))
+    if GENERATED in wanted and GENERATED not in result:
+        result[GENERATED] = ("vertex", _read_generated(mesh))
     return result, active
+
+
+def _read_generated(mesh: Any) -> NDArray[np.float32]:
+    """Places in the undeformed mesh's texture space, 0 to 1."""
+    points = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("undeformed_co", points.ravel())
+    middle, half = np.array(mesh.texspace_location[:], np.float32), np.array(mesh.texspace_size[:], np.float32)
+    return (points - middle) * (np.float32(0.5) / np.where(half == 0, np.float32(1), half)) + np.float32(0.5)
 
 
 def _read_byte_colors(data: Any) -> NDArray[np.float32]:

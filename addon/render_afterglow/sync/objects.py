@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from .lights import is_portal, read_light
 from .materials import MaterialTable, digest
 from .meshes import fingerprint, read_mesh
+from .nodes import GENERATED
+from .points import point_transforms, unit_sphere
 from .visibility import object_visibility
 
 # what else is no mesh is shown by nothing (cameras, empties) or comes a second time as a mesh (curves, text, surfaces)
-LEFT_OUT = {"VOLUME": "volumes", "CURVES": "hair curves", "POINTCLOUD": "point clouds", "GPENCIL": "grease pencil",
-            "GREASEPENCIL": "grease pencil"}
+LEFT_OUT = {"VOLUME": "volumes", "CURVES": "hair curves"}
 GroupKey = tuple[int, int, int]  # addresses of the original object and of the original parent (0: none), number among those
 
 
@@ -35,6 +36,7 @@ class MeshUse:
     original_data: int          # address
     maker: Any = None           # the object to ask by `to_mesh`, where the data are not a mesh to be read as it is
     wanted: set[str] = field(default_factory=set)
+    is_points: bool = False     # a point cloud: a small sphere stands for each point
 
 
 @dataclass
@@ -59,6 +61,7 @@ class Group:
     randoms: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
     mesh_handle: int | None = None
     shown: dict[str, Any] | None = None    # properties that the native scene has
+    points: NDArray[np.float64] | None = None  # (N, 4, 4): where in the object's space the mesh stands, if not once
 
 
 @dataclass
@@ -149,7 +152,7 @@ class ObjectTable:
             if lights:
                 self._light(instance, ob, data, self._number(addresses))
             return LIGHT
-        if kind in {"MESH", "META"}:
+        if kind in {"MESH", "META", "POINTCLOUD"}:
             key = self._number(addresses)
             use = self.uses.get(addresses[2])
             if use is None:
@@ -157,8 +160,11 @@ class ObjectTable:
                 maker = (instance.instance_object if instance.is_instance else ob) if temporary else None
                 # an instance's object is gone after this step of the walk: nothing but its data may be kept
                 original = ob.original.data
-                use = self.uses[addresses[2]] = MeshUse(data, key, ob.name, original.as_pointer() if original else 0, maker)
-            return Walk(key, self._group(instance, ob, data, key, use))
+                use = self.uses[addresses[2]] = MeshUse(data, key, ob.name, original.as_pointer() if original else 0, maker,
+                                                        is_points=kind == "POINTCLOUD")
+            walk = Walk(key, self._group(instance, ob, data, key, use))
+            walk.group.points = point_transforms(data) if use.is_points else None
+            return walk
         if kind in LEFT_OUT:
             self.warn(f"Object '{ob.name}': {LEFT_OUT[kind]} are not supported yet: left out")
         return NOTHING
@@ -187,6 +193,7 @@ class ObjectTable:
             group = old
             group.address = data.as_pointer()
         else:
+            self._warn_of(ob)
             pairs = [self.materials.handle(material, ob.name) for material in self._slots(ob, data)]
             parent = instance.parent if instance.is_instance else None
             bits, holdout, catcher = object_visibility(ob, parent, self.layer)
@@ -199,6 +206,14 @@ class ObjectTable:
         for address in group.materials:
             use.wanted |= self.materials.table[address].attributes
         return group
+
+    def _warn_of(self, ob: Any) -> None:
+        """What an object asks for and does not get."""
+        if any(system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in ob.particle_systems):
+            self.warn(f"Object '{ob.name}': hair is not supported yet: left out")
+        linking = getattr(ob, "light_linking", None)
+        if linking is not None and (linking.receiver_collection or linking.blocker_collection):
+            self.warn(f"Object '{ob.name}': light linking is not supported yet: every light reaches every object")
 
     def _finish(self, walks: list[Walk]) -> None:
         groups = {walk.key: walk.group for walk in walks}
@@ -254,14 +269,17 @@ class ObjectTable:
     @staticmethod
     def _names(use: MeshUse) -> frozenset[str]:
         attributes = getattr(use.data, "attributes", ())
-        return frozenset(name for name in use.wanted if name == "" or name in attributes)
+        return frozenset(name for name in use.wanted if name in ("", GENERATED) or name in attributes)
 
     def _read_mesh(self, use: MeshUse, address: int, names: frozenset[str], known: MeshEntry | None) -> MeshEntry:
         entry = MeshEntry(known.handle if known else None, use.key, address, fingerprint_of(use), names)
         arguments = None
         try:
             mesh = use.data if use.maker is None else use.maker.to_mesh()
-            arguments = read_mesh(mesh, names) if mesh is not None else None
+            if use.is_points:
+                arguments = unit_sphere()
+            elif mesh is not None:
+                arguments = read_mesh(mesh, names)
             if arguments is not None:
                 self._store_mesh(entry, known, arguments, use.name)
         except Exception as error:  # noqa: BLE001  the render goes on without the object
@@ -300,9 +318,12 @@ class ObjectTable:
         group = walk.group
         transforms = stack_matrices(walk.matrices)
         randoms = np.array(walk.randoms, np.int64).astype(np.uint32)
+        if group.points is not None:
+            randoms = np.repeat(randoms, len(group.points))
+            transforms = (transforms[:, None] @ group.points[None]).reshape(-1, 4, 4)
         if group.mesh_handle != mesh or not np.array_equal(randoms, group.randoms):
             self._remove_group(group)
-            if mesh is not None:
+            if mesh is not None and len(transforms):
                 group.handles = self.scene.add_instances(
                     mesh, transforms, randoms=(randoms / np.float64(0xFFFFFFFF)).astype(np.float32), **group.properties)
                 self.report.instances += len(transforms)
@@ -355,7 +376,7 @@ NOTHING, LIGHT = Walk((0, 0, 0), None), Walk((0, 0, 0), None)
 
 
 def fingerprint_of(use: MeshUse) -> tuple[int, ...]:
-    return (0,) if use.maker is not None else fingerprint(use.data)
+    return (0,) if use.maker is not None or use.is_points else fingerprint(use.data)
 
 
 def checksum(arrays: Iterable[NDArray[Any] | None], start: int = 0) -> int:

@@ -137,12 +137,14 @@ class SceneSync:
             self.shading, updates.objects, updates.only_moved, updates.world = shading, True, False, True
         report.seconds["updates"] = self._lap(start)
 
+        if view is None and depsgraph.scene.render.use_motion_blur:
+            self.warn(f"Scene '{depsgraph.scene.name}': motion blur is not supported yet: rendered sharp")
         self.materials.begin(depsgraph, updates, report)
         report.seconds["materials"] = self._lap(start, report)
         if updates.everything or updates.objects or self.materials.attributes_changed:
             self.objects.update(depsgraph, layer, updates, report, lights=shading is None or shading[0])
         report.seconds["objects"] = self._lap(start, report)
-        self._update_world(depsgraph, layer, updates, report)
+        self._update_world(depsgraph, layer, report)
         self.materials.end(self.objects.used_materials(), self.objects.used_images() | self.world_images, report)
         report.seconds["world"] = self._lap(start, report)
         report.seconds["total"] = time.perf_counter() - start
@@ -153,7 +155,7 @@ class SceneSync:
     def _lap(start: float, report: SyncReport | None = None) -> float:
         return time.perf_counter() - start - (sum(report.seconds.values()) if report else 0.0)
 
-    def _update_world(self, depsgraph: Any, layer: Any, updates: Updates, report: SyncReport) -> None:
+    def _update_world(self, depsgraph: Any, layer: Any, report: SyncReport) -> None:
         if self.shading is not None and not self.shading[1]:
             arguments = studio_world(self.shading, self.materials)
             world = None

@@ -21,8 +21,8 @@ MAX_DEPTH = 64  # groups within groups; Blender forbids recursion, a broken file
 
 @dataclass
 class Context:
-    """What a tree needs from outside: image(image, image_user, material) → handle or None, warn(text), matrix(object) → its
-    world matrix as rows of floats or None, the owner's name for warnings."""
+    """What a tree needs from outside: image(image, image_user, material) → handle or None, warn(text), matrix(object) → world to
+    the object as rows of floats, the owner's name for warnings."""
 
     image: Callable[[Any, Any], int | None]
     warn: Callable[[str], None]
@@ -286,11 +286,26 @@ def constant_emission(graph: Graph) -> tuple[float, float, float] | None:
     return (red * strength, green * strength, blue * strength)
 
 
+GENERATED = "generated"  # the name under which a mesh carries coordinates of its undeformed shape
+
+
 def names_of_attributes(graph: Graph) -> set[str]:
     """Names of the mesh attributes that a graph asks for; "" is the active colour."""
-    kinds = {"attribute", "color_attribute"}
-    return {node["params"]["name"] for node in graph["nodes"] if node["type"] in kinds
-            and node["params"].get("kind", "geometry") == "geometry"}
+    names = set()
+    for node in graph["nodes"]:
+        kind, params = node["type"], node["params"]
+        if kind == "color_attribute" or (kind == "attribute" and params["kind"] == "geometry" and params["name"]):
+            names.add(params["name"])
+        if any(is_link(value) and value[2] == GENERATED for value in node["inputs"].values()) or reads_generated(node):
+            names.add(GENERATED)
+    return names
+
+
+def reads_generated(node: dict[str, Any]) -> bool:
+    """Textures without coordinates take generated ones, flat images UVs; radial tangents turn around them."""
+    if node["type"] == "tangent":
+        return node["params"]["direction_type"] == "radial"
+    return node["type"].endswith("_texture") and "vector" not in node["inputs"] and node["params"].get("projection") != "flat"
 
 
 def solid_graph(kind: str, color: tuple[float, ...], **inputs: Value) -> Graph:

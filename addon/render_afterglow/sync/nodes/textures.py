@@ -47,19 +47,6 @@ def texture_mapping(node: Any) -> np.ndarray | None:
     return result.astype(np.float32)
 
 
-def mapped(compiler: Compiler, view: NodeView, default: str) -> Source:
-    """The texture's coordinates with its own mapping applied; default: the coordinates of an unlinked input."""
-    vector, matrix = view.input("Vector"), texture_mapping(view.node)
-    if matrix is None:
-        return vector
-    if vector is None:
-        vector = compiler.link(default, "texture_coordinate", object_to_world=None)
-    rows = [compiler.link("value", "vector_math", "", {"vector": vector, "vector_001": tuple(map(float, row[:3]))},
-                          operation="dot_product") for row in matrix]
-    moved = [compiler.math("add", row, float(offset)) for row, offset in zip(rows, matrix[:, 3], strict=True)]
-    return compiler.link("color", "combine", "", dict(zip(("red", "green", "blue"), moved, strict=True)), mode="xyz")
-
-
 def image_texture_node(compiler: Compiler, view: NodeView) -> Outputs:
     node = view.node
     if node.image is None:  # as missing as a file that is gone
@@ -84,9 +71,9 @@ def environment_texture_node(compiler: Compiler, view: NodeView) -> Outputs:
     if node.image is None:
         return {"Color": MAGENTA}
     handle = compiler.context.image(node.image, node.image_user)
-    given = {"vector": mapped(compiler, view, "generated")}
-    return {"Color": compiler.link("color", "environment_texture", node.name, given, image=handle,
-                                   interpolation=node.interpolation.lower(), projection=node.projection.lower())}
+    return {"Color": compiler.link("color", "environment_texture", node.name, {"vector": view.input("Vector")}, image=handle,
+                                   interpolation=node.interpolation.lower(), projection=node.projection.lower(),
+                                   mapping=texture_mapping(node))}
 
 
 def procedural(kind: str, params: dict[str, str]) -> Any:
@@ -94,10 +81,8 @@ def procedural(kind: str, params: dict[str, str]) -> Any:
     def rule(compiler: Compiler, view: NodeView) -> Outputs:
         node = view.node
         given = {snake(name): value for name, value in view.inputs()}
-        if view.has("Vector"):
-            given["vector"] = mapped(compiler, view, "generated")
         values = {native: getattr(node, name) for native, name in params.items() if hasattr(node, name)}
-        index = compiler.add(kind, node.name, given,
+        index = compiler.add(kind, node.name, given, mapping=texture_mapping(node),
                              **{key: value.lower() if isinstance(value, str) else value for key, value in values.items()})
         return {socket.identifier: ("link", index, snake(socket.identifier)) for socket in node.outputs}
     return rule
@@ -108,7 +93,6 @@ def noise_node(compiler: Compiler, view: NodeView) -> Outputs:
     node = view.node
     musgrave = node.bl_idname == "ShaderNodeTexMusgrave"
     given = {snake(name): value for name, value in view.inputs()}
-    given["vector"] = mapped(compiler, view, "generated")
     if musgrave:
         dimension, lacunarity = view.input("Dimension"), view.input("Lacunarity")
         given["roughness"] = compiler.math("power", lacunarity, compiler.math("multiply", dimension, -1.0))
@@ -117,7 +101,8 @@ def noise_node(compiler: Compiler, view: NodeView) -> Outputs:
         given.pop("dimension", None)
     kind = (node.musgrave_type if musgrave else getattr(node, "noise_type", "FBM")).lower()
     params = {"dimensions": getattr(node, "musgrave_dimensions", "3D") if musgrave else node.noise_dimensions,
-              "noise_type": kind, "normalize": False if musgrave else getattr(node, "normalize", True)}
+              "noise_type": kind, "normalize": False if musgrave else getattr(node, "normalize", True),
+              "mapping": texture_mapping(node)}
     index = compiler.add("noise_texture", node.name, given, **params)
     return {socket.identifier: ("link", index, snake(socket.identifier)) for socket in node.outputs}
 
