@@ -17,7 +17,7 @@ Rgb transmittance(const WalkScene& walk, Ray ray, const PathContext& from, RayCo
       if (scene.materials.opaque(point.material)) return Rgb(0.0f);
       context.ray_length = hit.t;
       through *= scene.materials.transparency(scene.scene, point, context);
-      if (is_black(through) || context.transparent_depth++ > walk.limits.transparent) return Rgb(0.0f);
+      if (is_black(through) || ++context.transparent_depth > walk.limits.transparent) return Rgb(0.0f);
     }
     ray.origin = offset_origin(point, ray.direction);
     ray.t_max -= hit.t;
