@@ -111,6 +111,7 @@ def render_layer(
         session.cancel()
     statistics = dict(statistics)
     statistics["seconds"] = {**seconds, **statistics.get("seconds", {})}
+    statistics["bytes"] = {**native.scene.bytes, **statistics.get("bytes", {})}
     statistics["wall_time"] = time.perf_counter() - started
     statistics["cancelled"] = cancelled
     statistics["frame"] = scene.frame_current

@@ -24,6 +24,7 @@ from .sync.scene import viewport_shading
 
 _NOTHING = object()
 WATCH_SECONDS = 0.015  # how often the watcher looks for a newer picture
+AWAIT_SECONDS = 0.06  # how long a redraw waits for the first picture after an edit, at most
 REDRAW_SECONDS = 0.05  # between two redraws of a picture that refines slowly, at least
 
 
@@ -92,6 +93,7 @@ class Viewport:
         self.session: Any = None
         self.picture: display.Picture | None = None
         self.generation = -1
+        self.awaited = -1  # the picture of before the last edit; -1: a newer one is there
         self.view: CameraView | None = None
         self.settings: dict[str, Any] = {}
         self.shading: Any = None  # scene's or studio's lights and world, as they were synced
@@ -134,6 +136,7 @@ class Viewport:
             self._sync(context, depsgraph)
             self._start(context, depsgraph)
         else:
+            self.awaited = self.session.progress()["generation"]
             with self.session.edit():
                 self._sync(context, depsgraph)
                 self._set_view(context, depsgraph)
@@ -170,13 +173,14 @@ class Viewport:
         return view, settings
 
     def _set_view(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
-        """Gives the session the view and settings where these differ from the last ones; one restart for all of them."""
+        """Gives the session the view and settings where these differ from the last ones, by one restart."""
         view, settings = self._wanted(context, depsgraph)
         moved = not same_camera(view.camera, self.view.camera)
         relit = viewport_shading(context.space_data) != self.shading
         changed = {name: value for name, value in settings.items() if value != self.settings.get(name, _NOTHING)}
         self.view, self.settings = view, settings
         if moved or relit or changed:
+            self.awaited = self.session.progress()["generation"]
             with self.session.edit():
                 if relit:
                     self._sync(context, depsgraph)
@@ -218,13 +222,24 @@ class Viewport:
             traceback.print_exc()
             self.fail(engine, str(error))
 
-    def _draw(self, engine: Any, context: bpy.types.Context) -> None:
+    def _await(self) -> dict[str, Any]:
+        """The session's progress, after an edit as soon as its first picture is there, or without it a moment later:
+        what is drawn then mostly is new, and no time goes into drawing an old picture once more."""
+        end = time.perf_counter() + AWAIT_SECONDS
         progress = self.session.progress()
+        while progress["generation"] == self.awaited and progress["state"] == "running" and time.perf_counter() < end:
+            time.sleep(0.001)
+            progress = self.session.progress()
+        self.awaited = -1
+        return progress
+
+    def _draw(self, engine: Any, context: bpy.types.Context) -> None:
+        progress = self._await()
         x0, y0, x1, y1 = self.view.region
         width, height = x1 - x0, y1 - y0
         if width <= 0 or height <= 0:
             return
-        if progress["generation"] != self.generation:
+        if progress["generation"] != self.generation and progress["generation"] > 0:
             if self.picture is None or (self.picture.width, self.picture.height) != (width, height):
                 self.picture = display.Picture(width, height)
             self.session.read("combined", self.picture.pixels)

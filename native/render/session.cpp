@@ -163,7 +163,7 @@ SessionProgress Session::progress() const {
     if (p.fraction > 0.0 && state_ == SessionState::kRunning) p.remaining = p.elapsed / p.fraction - p.elapsed;
   }
   if (state_ == SessionState::kFinished) p.fraction = 1.0, p.remaining = 0.0;
-  if (!shown_ && done != generation_at_) {
+  if (!shown_ && film_step_ == 1 && done != generation_at_) {
     generation_at_ = done;
     const_cast<Session*>(this)->generation_++;
   }
@@ -279,7 +279,7 @@ void Session::run(RenderSettings settings) {
     ended_ = now();
     stage_ = state_name(state_);
   }
-  generation_++;
+  if (failure || result == SessionState::kFinished) generation_++;  // stopped for an edit: nothing new to see
   changed_.notify_all();
 }
 

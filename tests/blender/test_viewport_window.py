@@ -207,7 +207,7 @@ def test_first_picture_after_a_move_comes_soon(in_window: Run, box: Path) -> Non
         box,
     )
     delays = sorted(found["delays"])
-    # the median, and generous, for a machine that does other things; the real figure is a benchmark's
+    # the median; generous, for a machine that does other things: the real figure is a benchmark
     assert delays[3] < 3.0, delays
 
 
@@ -215,7 +215,8 @@ def test_switching_modes_leaves_nothing(in_window: Run, box: Path) -> None:
     found = in_window(
         """
         import gc, threading, time
-        s = scene(); s.render.preview_pixel_size = '4'; s.afterglow.preview_accuracy, s.afterglow.preview_samples = 0.0, 4096
+        s = scene(); s.render.preview_pixel_size = '4'
+        s.afterglow.preview_accuracy, s.afterglow.preview_samples = 0.0, 4096
         def steps():
             space = full_view(); yield 1.5
             kind = addon('viewport').Viewport
