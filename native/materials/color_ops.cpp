@@ -28,19 +28,19 @@ float bell(float x, float centre, float left, float right) {
   return std::exp(-0.5f * t * t);
 }
 
-Vec3 observer(float nm) {
-  return {1.056f * bell(nm, 599.8f, 0.0264f, 0.0323f) + 0.362f * bell(nm, 442.0f, 0.0624f, 0.0374f) -
-              0.065f * bell(nm, 501.1f, 0.0490f, 0.0382f),
-          0.821f * bell(nm, 568.8f, 0.0213f, 0.0247f) + 0.286f * bell(nm, 530.9f, 0.0613f, 0.0322f),
-          1.217f * bell(nm, 437.0f, 0.0845f, 0.0278f) + 0.681f * bell(nm, 459.0f, 0.0385f, 0.0725f)};
-}
-
 Rgb xyz_to_rgb(const Vec3& c) {
   return {3.2404542f * c.x - 1.5371385f * c.y - 0.4985314f * c.z, -0.9692660f * c.x + 1.8760108f * c.y + 0.0415560f * c.z,
           0.0556434f * c.x - 0.2040259f * c.y + 1.0572252f * c.z};
 }
 
 }  // namespace
+
+Vec3 observer(float nm) {
+  return {1.056f * bell(nm, 599.8f, 0.0264f, 0.0323f) + 0.362f * bell(nm, 442.0f, 0.0624f, 0.0374f) -
+              0.065f * bell(nm, 501.1f, 0.0490f, 0.0382f),
+          0.821f * bell(nm, 568.8f, 0.0213f, 0.0247f) + 0.286f * bell(nm, 530.9f, 0.0613f, 0.0322f),
+          1.217f * bell(nm, 437.0f, 0.0845f, 0.0278f) + 0.681f * bell(nm, 459.0f, 0.0385f, 0.0725f)};
+}
 
 Vec3 rgb_to_hsv(const Rgb& c) {
   const float high = max_component(c), low = std::fmin(c.x, std::fmin(c.y, c.z)), span = high - low;

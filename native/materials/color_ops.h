@@ -10,6 +10,8 @@ Vec3 rgb_to_hsv(const Rgb&);
 Rgb hsv_to_rgb(const Vec3&);
 Vec3 rgb_to_hsl(const Rgb&);
 Rgb hsl_to_rgb(const Vec3&);
+/// X, Y and Z of one watt at a wavelength in nanometres (Y peaks at 1).
+Vec3 observer(float nanometres);
 /// A black body's colour of about unit luminance; kelvin.
 Rgb blackbody(float kelvin);
 /// The colour of light of one wavelength, in nanometres.

@@ -7,6 +7,6 @@
 
 namespace afterglow {
 
-Vec3 run_pattern(Op, const Vec3& a, const Vec3& b, const Vec3& c, const Operands&, Vec3* second);
+Vec3 run_pattern(const Instruction&, const Vec3& a, const Vec3& b, const Vec3& c, const Operands&, Vec3* second);
 
 }  // namespace afterglow

@@ -111,7 +111,7 @@ Vec3 run_texture(const Instruction& ins, const Operands& in, const HitContext& h
   switch (ins.op) {
     case Op::kImage: return image(a, in, hit, second);
     case Op::kEnvironment: return environment(a, in, hit);
-    default: return run_pattern(ins.op, a, operand(ins.b), operand(ins.c), in, second);
+    default: return run_pattern(ins, a, operand(ins.b), operand(ins.c), in, second);
   }
 }
 
