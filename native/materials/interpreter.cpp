@@ -121,7 +121,7 @@ Rgb checker(const Vec3& p, const Rgb& a, const Rgb& b, bool& first) {
   // An offset keeps whole numbers, where faces of cubes lie, from flickering.
   const Vec3 q = (p + 0.000001f) * 0.999999f;
   const int sum = std::abs(int(std::floor(q.x))) + std::abs(int(std::floor(q.y))) + std::abs(int(std::floor(q.z)));
-  first = (sum & 1) == 0;
+  first = (sum & 1) != 0;
   return first ? a : b;
 }
 

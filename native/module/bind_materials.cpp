@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The building blocks of materials for tests and researchers: BSDFs and node graphs by themselves, without a scene.
+#include <pybind11/stl.h>
+
 #include "materials/standalone.h"
 #include "module/bindings.h"
 
