@@ -269,6 +269,7 @@ def test_empty_scene_renders(in_blender: Run) -> None:
     assert found["nothing"] == 0
 
 
+@pytest.mark.slow
 def test_cancel_is_obeyed_within_50_ms(in_blender: Run, box: Path) -> None:
     found = in_blender(
         """

@@ -45,7 +45,7 @@ def box(blend_files: Path) -> Path:
     return blend_files / "cornell_box.blend"
 
 
-@pytest.mark.parametrize("transform", ["Standard", "Filmic"])
+@pytest.mark.parametrize("transform", ["Standard", pytest.param("Filmic", marks=pytest.mark.slow)])
 def test_viewport_equals_the_final_render(in_window: Run, box: Path, transform: str) -> None:
     found = in_window(
         "import os\n"
@@ -134,6 +134,7 @@ def test_edits_are_seen_in_the_next_picture(in_window: Run, box: Path) -> None:
         assert seen[name] < 1e-6, seen
 
 
+@pytest.mark.slow
 def test_local_view_border_and_pixel_size(in_window: Run) -> None:
     found = in_window(
         """
@@ -184,6 +185,7 @@ def test_local_view_border_and_pixel_size(in_window: Run) -> None:
     assert 0 < found["coarse"] < 0.1
 
 
+@pytest.mark.slow
 def test_first_picture_after_a_move_comes_soon(in_window: Run, box: Path) -> None:
     found = in_window(
         """
@@ -211,6 +213,7 @@ def test_first_picture_after_a_move_comes_soon(in_window: Run, box: Path) -> Non
     assert delays[3] < 3.0, delays
 
 
+@pytest.mark.slow
 def test_switching_modes_leaves_nothing(in_window: Run, box: Path) -> None:
     found = in_window(
         """
@@ -238,6 +241,7 @@ def test_switching_modes_leaves_nothing(in_window: Run, box: Path) -> None:
     assert "Traceback" not in found["output"], found["output"][-3000:]
 
 
+@pytest.mark.slow
 def test_interface_stays_alive_while_rendering(in_window: Run, blend_files: Path) -> None:
     found = in_window(
         """
@@ -259,6 +263,7 @@ def test_interface_stays_alive_while_rendering(in_window: Run, blend_files: Path
     assert gaps[len(gaps) * 9 // 10] < 0.2, gaps[-20:]
 
 
+@pytest.mark.slow
 def test_material_preview_renders(in_window: Run) -> None:
     found = in_window(
         """
