@@ -114,6 +114,8 @@ void Film::read_pixel(Pass pass, const float* sums, uint32_t samples, float* out
       out[3] = samples ? std::clamp(1.0f - from[3] * scale, 0.0f, 1.0f) : 0.0f;
       break;
     case Pass::kDepth:
+      out[0] = from && from[0] != 0.0f ? from[0] : 1e10f;  // nothing there
+      break;
     case Pass::kPosition:
     case Pass::kObjectIndex:
     case Pass::kMaterialIndex:

@@ -26,6 +26,7 @@ struct WalkScene {
   const CommittedScene& scene;
   WalkLimits limits;
   const InstanceMask* shown = nullptr;  // local view; null: everything
+  bool with_uv = true;                  // somebody looks at SurfacePoint::uv
   bool shows(uint32_t instance) const { return !shown || ((*shown)[instance / 64] >> (instance % 64) & 1); }
 };
 
@@ -112,9 +113,7 @@ class Walker {
   }
 
   SurfacePoint point_at(const PathState& path, const Hit& hit) const {
-    const InstanceRecord& instance = scene_.scene.instances()[hit.instance];
-    (void)instance;
-    return surface_point(scene_.scene, path.ray, hit, scene_.effects.has(kTextures));
+    return surface_point(scene_.scene, path.ray, hit, walk_.with_uv);
   }
 
   float emission_weight(const PathState& path, const SurfacePoint& point) const {

@@ -93,7 +93,7 @@ def test_cancel_while_paused_and_start_again() -> None:
     s.pause()
     s.cancel()
     s.start()
-    assert s.wait() and s.progress()["samples"] == 24
+    assert s.wait() and s.progress()["samples"] == 64
 
 
 def test_edit_stops_and_starts_again_on_the_new_scene() -> None:
