@@ -12,10 +12,14 @@ namespace {
 
 constexpr int kSide = 32;         // two-dimensional tables
 constexpr int kCube = 16;         // three-dimensional ones
-constexpr int kSamples = 16;      // squared
+constexpr int kPlanePoints = 1024, kCubePoints = 384;
 constexpr float kLeastZ = 0.01f;  // Fresnel tables: sqrt(|ior − 1| / (ior + 1)) from here
 
-Vec2 point(int k) { return {(k % kSamples + 0.5f) / kSamples, (k / kSamples + 0.5f) / kSamples}; }
+/// Points of the additive recurrence with the plastic number (Roberts 2018).
+Vec2 point(int k) {
+  const double x = 0.5 + 0.7548776662466927 * k, y = 0.5 + 0.5698402909980532 * k;
+  return {float(x - std::floor(x)), float(y - std::floor(y))};
+}
 
 /// Tables are dense where albedo changes quickly: near grazing.
 float cosine_at(int k, int side) { return std::fmax(sqr(float(k) / float(side - 1)), 1e-3f); }
@@ -29,9 +33,9 @@ float ior_at(float axis) {
 
 /// Calls visit(o·h, G2/G1 of the reflection or 0, h, o) over the visible normals.
 template <class Visit>
-void integrate(float cosine, float alpha, Visit visit) {
+void integrate(float cosine, float alpha, int points, Visit visit) {
   const Vec3 o(std::sqrt(1.0f - cosine * cosine), 0.0f, cosine);
-  for (int k = 0; k < kSamples * kSamples; ++k) visit(o, ggx_sample(o, alpha, alpha, point(k)));
+  for (int k = 0; k < points; ++k) visit(o, ggx_sample(o, alpha, alpha, point(k)));
 }
 
 float weight(const Vec3& o, const Vec3& i, float alpha) {
@@ -77,11 +81,11 @@ struct Reflection {
       const float alpha = alpha_at(r, kSide);
       for (int c = 0; c < kSide; ++c) {
         float sum = 0.0f;
-        integrate(cosine_at(c, kSide), alpha, [&](const Vec3& o, const Vec3& h) {
+        integrate(cosine_at(c, kSide), alpha, kPlanePoints, [&](const Vec3& o, const Vec3& h) {
           const Vec3 i = h * (2.0f * glm::dot(o, h)) - o;
           if (i.z > 0.0f) sum += weight(o, i, alpha);
         });
-        albedo.values.push_back(std::fmin(sum / (kSamples * kSamples), 1.0f));
+        albedo.values.push_back(std::fmin(sum / kPlanePoints, 1.0f));
       }
     }
     for (int r = 0; r < kSide; ++r) {
@@ -102,7 +106,7 @@ struct Share {
         const float alpha = alpha_at(r, kCube);
         for (int c = 0; c < kCube; ++c) {
           float sum = 0.0f, all = 0.0f;
-          integrate(cosine_at(c, kCube), alpha, [&](const Vec3& o, const Vec3& h) {
+          integrate(std::fmax(float(c) / (kCube - 1), 1e-3f), alpha, kCubePoints, [&](const Vec3& o, const Vec3& h) {
             const float oh = glm::dot(o, h);
             const Vec3 i = h * (2.0f * oh) - o;
             if (i.z <= 0.0f) return;
@@ -119,6 +123,7 @@ struct Share {
 
 struct Glass {
   Cube cube;
+  Plane mean;  // roughness, index
   explicit Glass(bool inside) {
     for (int z = 0; z < kCube; ++z) {
       const float outer = ior_at(float(z) / (kCube - 1)), ior = inside ? 1.0f / outer : outer;
@@ -126,7 +131,7 @@ struct Glass {
         const float alpha = alpha_at(r, kCube);
         for (int c = 0; c < kCube; ++c) {
           float sum = 0.0f;
-          integrate(cosine_at(c, kCube), alpha, [&](const Vec3& o, const Vec3& h) {
+          integrate(cosine_at(c, kCube), alpha, kCubePoints, [&](const Vec3& o, const Vec3& h) {
             const float oh = glm::dot(o, h), f = fresnel_dielectric(oh, ior);
             const Vec3 i = h * (2.0f * oh) - o;
             if (i.z > 0.0f) sum += f * weight(o, i, alpha);
@@ -135,8 +140,18 @@ struct Glass {
             const Vec3 t = h * (oh / ior - std::sqrt(cos2)) - o / ior;
             if (t.z < 0.0f) sum += (1.0f - f) * weight(o, t, alpha);
           });
-          cube.values.push_back(std::fmin(sum / (kSamples * kSamples), 1.0f));
+          cube.values.push_back(std::fmin(sum / kCubePoints, 1.0f));
         }
+      }
+    }
+    for (int z = 0; z < kCube; ++z) {
+      for (int r = 0; r < kCube; ++r) {
+        float sum = 0.0f;
+        for (int k = 0; k < 32; ++k) {
+          const float cosine = (float(k) + 0.5f) / 32.0f, step = 1.0f / float(kCube - 1);
+          sum += cube.at(axis_of_cosine(cosine), float(r) * step, float(z) * step) * 2.0f * cosine / 32.0f;
+        }
+        mean.values.push_back(sum);
       }
     }
   }
@@ -160,13 +175,24 @@ float ggx_mean_albedo(float roughness) {
 
 float schlick_share(float cosine, float roughness, float ior) {
   static const Share table;
-  return table.cube.at(axis_of_cosine(cosine), roughness, axis_of_ior(std::fmax(ior, 1.0f / ior)));
+  return table.cube.at(cosine, roughness, axis_of_ior(std::fmax(ior, 1.0f / ior)));
 }
 
-float glass_albedo(float cosine, float roughness, float ior) {
+namespace {
+
+const Glass& glass(float ior) {
   static const Glass entering(false), leaving(true);
-  const float axis = axis_of_ior(std::fmax(ior, 1.0f / ior));
-  return (ior >= 1.0f ? entering : leaving).cube.at(axis_of_cosine(cosine), roughness, axis);
+  return ior >= 1.0f ? entering : leaving;
+}
+
+}  // namespace
+
+float glass_albedo(float cosine, float roughness, float ior) {
+  return glass(ior).cube.at(axis_of_cosine(cosine), roughness, axis_of_ior(std::fmax(ior, 1.0f / ior)));
+}
+
+float glass_mean_albedo(float roughness, float ior) {
+  return glass(ior).mean.at(roughness, axis_of_ior(std::fmax(ior, 1.0f / ior)), kCube);
 }
 
 }  // namespace afterglow

@@ -13,5 +13,7 @@ float ggx_mean_albedo(float roughness);
 float schlick_share(float cosine, float roughness, float ior);
 /// Share of light that rough glass of this index returns, both sides together.
 float glass_albedo(float cosine, float roughness, float ior);
+/// The same averaged over cosine-weighted directions.
+float glass_mean_albedo(float roughness, float ior);
 
 }  // namespace afterglow

@@ -2,6 +2,7 @@
 // Evaluation, sampling and densities of a Surface with any lobes. One lobe is chosen by its sampling weight; the density
 // is the mixture's, so that next-event light and sampled directions agree. Microfacets: Walter et al. 2007, Heitz 2014;
 // diffuse with roughness: Portsmouth, Kutz and Hill 2024 (energy-preserving Oren–Nayar); Burley 2015.
+#include "materials/albedo_tables.h"
 #include "materials/microfacet.h"
 #include "materials/sheen.h"
 
@@ -52,7 +53,8 @@ Rgb oren_nayar(const Lobe& lobe, const Vec3& o, const Vec3& i, float cos_o, floa
     const float mean_e = a * kPi + (2.0f * kPi - 5.6f) / 3.0f * b;
     const float missing = (1.0f - (a * kPi + b * oren_nayar_integral(cos_o))) *
                           (1.0f - (a * kPi + b * oren_nayar_integral(cos_i)));
-    const Rgb bounced = lobe.f0 * (mean_e / (1.0f - mean_e)) / (Rgb(1.0f) - lobe.f0 * (1.0f - mean_e));
+    // Blender takes the albedo squared here, on top of the weight: darker colours stay a little darker than the paper's.
+    const Rgb bounced = lobe.f0 * lobe.f0 * (mean_e / (1.0f - mean_e)) / (Rgb(1.0f) - lobe.f0 * (1.0f - mean_e));
     value += bounced * (std::fmax(missing, 0.0f) * kInvPi);
   }
   return value * cos_i;
@@ -303,6 +305,22 @@ BsdfSample sample<false>(const Surface& surface, const Vec3& face, const Vec3& o
   return result;
 }
 
+namespace {
+
+/// The Fresnel term averaged over the microfacets that are seen, as Blender's colour passes have it.
+Rgb mean_fresnel(const Lobe& lobe, float cosine) {
+  if (lobe.fresnel == Fresnel::kNone) return Rgb(1.0f);
+  if (lobe.fresnel == Fresnel::kConductor || lobe.distribution != Distribution::kGgx) return fresnel(lobe, cosine);
+  const float roughness = std::sqrt(std::sqrt(lobe.alpha_x * lobe.alpha_y));
+  if (lobe.fresnel == Fresnel::kF82) return lerp(lobe.f0, Rgb(1.0f), schlick_share(cosine, roughness, 1.5f));
+  if (lobe.ior < 1.0f) return fresnel(lobe, cosine);
+  const Rgb start = lobe.fresnel == Fresnel::kDielectric ? Rgb(f0_from_ior(lobe.ior)) : lobe.f0;
+  const Rgb end = lobe.kind == LobeKind::kMicrofacetReflection ? lobe.f90 : Rgb(1.0f);
+  return lerp(start, end, schlick_share(cosine, roughness, lobe.ior));
+}
+
+}  // namespace
+
 SurfaceAlbedo albedo(const Surface& surface, const Vec3& outgoing) {
   SurfaceAlbedo result;
   for (int k = 0; k < surface.count; ++k) {
@@ -312,17 +330,18 @@ SurfaceAlbedo albedo(const Surface& surface, const Vec3& outgoing) {
       result.diffuse += lobe.weight;
       continue;
     }
-    const float cosine = saturate(glm::dot(lobe.normal, outgoing));
-    const Rgb f = fresnel(lobe, cosine);
+    const Rgb weight = lobe.weight / lobe.energy;
+    const Rgb f = mean_fresnel(lobe, saturate(glm::dot(lobe.normal, outgoing)));
     if (lobe.kind == LobeKind::kMicrofacetReflection) {
-      result.glossy += lobe.weight * f;
+      result.glossy += weight * f;
     } else if (lobe.kind == LobeKind::kMicrofacetRefraction) {
-      result.transmission += lobe.weight * (lobe.fresnel == Fresnel::kNone ? lobe.f90 : (Rgb(1.0f) - f) * lobe.f90);
+      result.transmission += weight * (lobe.fresnel == Fresnel::kNone ? lobe.f90 : (Rgb(1.0f) - f) * lobe.f90);
     } else {
       Rgb r, t;
       reflect_chance(lobe, f, r, t);
-      result.glossy += lobe.weight * r;
-      result.transmission += lobe.weight * t;
+      result.glossy += weight * r;
+      reflect_chance(lobe, fresnel(lobe, saturate(glm::dot(lobe.normal, outgoing))), r, t);
+      result.transmission += weight * t;
     }
   }
   return result;

@@ -60,12 +60,9 @@ Vec3 reflecting_normal(const Vec3& n, const Vec3& face, const Vec3& o) {
 void compensate(Lobe& lobe, const Vec3& outgoing, const Rgb& mean_fresnel) {
   const float cosine = saturate(glm::dot(lobe.normal, outgoing));
   const float roughness = std::sqrt(std::sqrt(lobe.alpha_x * lobe.alpha_y));
-  if (lobe.kind == LobeKind::kMicrofacetGlass) {
-    lobe.energy = 1.0f / std::fmax(glass_albedo(cosine, roughness, lobe.ior), 0.1f);
-    lobe.weight *= lobe.energy;
-    return;
-  }
-  const float e = std::fmax(ggx_albedo(cosine, roughness), 0.05f), mean_e = ggx_mean_albedo(roughness);
+  const bool glass = lobe.kind == LobeKind::kMicrofacetGlass || lobe.kind == LobeKind::kMicrofacetRefraction;
+  const float e = std::fmax(glass ? glass_albedo(cosine, roughness, lobe.ior) : ggx_albedo(cosine, roughness), 0.05f);
+  const float mean_e = glass ? glass_mean_albedo(roughness, lobe.ior) : ggx_mean_albedo(roughness);
   const Rgb bounced = mean_fresnel * mean_e / (Rgb(1.0f) - mean_fresnel * (1.0f - mean_e));
   lobe.energy = 1.0f / e;
   lobe.weight *= Rgb(1.0f) + bounced * ((1.0f - e) / e);

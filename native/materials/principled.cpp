@@ -24,12 +24,15 @@ Lobe reflection(const Vec3& normal, const HitContext& hit) {
   return lobe;
 }
 
-/// The share of light that a dielectric layer returns, by colour.
-Rgb dielectric_albedo(const Lobe& lobe, const Vec3& outgoing) {
+/// The Fresnel term of a dielectric layer averaged over its microfacets.
+Rgb dielectric_fresnel(const Lobe& lobe, const Vec3& outgoing, const Rgb& f90) {
   const float cosine = saturate(glm::dot(lobe.normal, outgoing));
   const float roughness = std::sqrt(std::sqrt(lobe.alpha_x * lobe.alpha_y));
-  return lerp(lobe.f0, lobe.f90, schlick_share(cosine, roughness, lobe.ior));
+  return lerp(lobe.f0, f90, schlick_share(cosine, roughness, lobe.ior));
 }
+
+/// What a layer takes from those below, as Blender reckons it: compensation counts by its darkening alone.
+Rgb returned_by(const Lobe& lobe, const Vec3& outgoing) { return lobe.weight / lobe.energy * dielectric_fresnel(lobe, outgoing, lobe.f90); }
 
 }  // namespace
 
@@ -74,7 +77,7 @@ void add_principled(const Operands& in, const HitContext& hit, Surface& surface)
       lobe.ior = coat_ior;
       lobe.f0 = Rgb(f0_from_ior(coat_ior));
       lobe.weight = weight * coat;
-      const Rgb returned = lobe.weight * dielectric_albedo(lobe, o);
+      const Rgb returned = returned_by(lobe, o);
       lobe.sampling_weight = mean(returned);
       push_lobe(surface, lobe);
       weight = under(weight, returned);
@@ -124,7 +127,10 @@ void add_principled(const Operands& in, const HitContext& hit, Surface& surface)
       lobe.f90 = no_refraction ? Rgb(0.0f) : glm::sqrt(clamped);
       lobe.weight = weight * transmission;
       lobe.sampling_weight = mean(lobe.weight);
-      if (multi && lobe.alpha_x > 0.0f) compensate(lobe, o, clamped);
+      if (multi && lobe.alpha_x > 0.0f) {
+        const Rgb reflected = dielectric_fresnel(lobe, o, Rgb(1.0f));
+        compensate(lobe, o, reflected + (Rgb(1.0f) - reflected) * glm::sqrt(clamped));
+      }
       push_lobe(surface, lobe);
     }
     weight *= 1.0f - transmission;
@@ -142,10 +148,10 @@ void add_principled(const Operands& in, const HitContext& hit, Surface& surface)
     lobe.ior = eta;
     lobe.f0 = f0 * tint;
     lobe.weight = weight;
-    const Rgb returned = weight * dielectric_albedo(lobe, o);
-    lobe.sampling_weight = mean(returned);
-    if (f0 > 0.0f || eta != 1.0f) {
-      if (multi) compensate(lobe, o, dielectric_albedo(lobe, o));
+    if (eta != 1.0f) {
+      if (multi) compensate(lobe, o, dielectric_fresnel(lobe, o, lobe.f90));
+      const Rgb returned = returned_by(lobe, o);
+      lobe.sampling_weight = mean(returned * lobe.energy);
       push_lobe(surface, lobe);
       weight = under(weight, returned);
     }

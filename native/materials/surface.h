@@ -56,7 +56,7 @@ struct alignas(16) Lobe {
   float alpha_x = 0.0f, alpha_y = 0.0f;  // squared roughness; below kMirrorAlpha the lobe is a delta
   float ior = 1.5f;                      // inside over outside as the ray meets it
   Rgb f0{0.0f}, f90{1.0f};               // Fresnel end points or edge tint
-  float energy = 1.0f;                   // multiple-scattering compensation (Turquin 2019)
+  float energy = 1.0f;  // share of the weight that compensates for multiple scattering (Turquin 2019): not of the albedo
 };
 
 struct Surface {
