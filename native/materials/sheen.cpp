@@ -2,6 +2,10 @@
 // Sheen as a linearly transformed cosine (Zeltner, Burley and Chiang 2022): see sheen.h.
 #include "materials/sheen.h"
 
+#include <algorithm>
+
+#include "materials/sheen_table.h"
+
 namespace afterglow {
 namespace {
 
@@ -19,11 +23,11 @@ Frame view_frame(const Vec3& normal, const Vec3& outgoing) {
 }  // namespace
 
 float sheen_albedo(float cosine, float roughness) {
-  const float c = saturate(cosine), r = std::fmin(std::fmax(roughness, kLeastRoughness), 1.0f);
-  const float width = r * (0.0206607f + 1.58491f * r) / (0.0379424f + r * (1.32227f + r));
-  const float centre = r * (-0.193854f + r * (-1.14885f + r * (1.7932f - 0.95943f * r * r))) / (0.046391f + r);
-  const float base = r * (0.000654023f + r * (0.119681f * r - 0.0207818f)) / (1.26264f + r * (r - 1.92021f));
-  return saturate(std::exp(-0.5f * sqr((c - centre) / width)) / (width * 2.50662827f) + base);
+  const float x = saturate(cosine) * (kSheenColumns - 1), y = saturate(roughness) * (kSheenRows - 1);
+  const int ix = std::min(int(x), kSheenColumns - 2), iy = std::min(int(y), kSheenRows - 2);
+  const float tx = x - float(ix), ty = y - float(iy);
+  const float *low = kSheenAlbedo[iy] + ix, *high = kSheenAlbedo[iy + 1] + ix;
+  return (low[0] * (1 - tx) + low[1] * tx) * (1 - ty) + (high[0] * (1 - tx) + high[1] * tx) * ty;
 }
 
 void sheen_setup(Lobe& lobe, float cosine, float roughness) {
