@@ -106,6 +106,85 @@ float light_importance(const LightBounds& b, const Vec3& position, const Vec3& n
   return std::max(b.intensity * cos_out * cos_in / std::max(d2, floor2), 1e-35f);
 }
 
+void LightTree::Columns::fill(std::span<const LightBounds> lights) {
+  const size_t size = lights.size() + kSingleLeaf;  // blocks of eight may read beyond the end
+  for (auto* column : {&center_x, &center_y, &center_z, &radius2, &axis_x, &axis_y, &axis_z, &cos_normals, &sin_normals,
+                       &cos_emission, &intensity, &two_sided})
+    column->assign(size, 0.0f);
+  for (size_t i = 0; i < lights.size(); ++i) {
+    const LightBounds& b = lights[i];
+    const Vec3 center = b.box.empty() ? Vec3(0.0f) : b.box.center(),
+               half = b.box.empty() ? center : b.box.upper - center;
+    center_x[i] = center.x, center_y[i] = center.y, center_z[i] = center.z;
+    radius2[i] = glm::dot(half, half);
+    axis_x[i] = b.axis.x, axis_y[i] = b.axis.y, axis_z[i] = b.axis.z;
+    cos_normals[i] = b.cos_normals, sin_normals[i] = sine_of(b.cos_normals);
+    cos_emission[i] = b.cos_emission;
+    intensity[i] = b.intensity > 0.0f ? b.intensity : 0.0f;
+    two_sided[i] = b.two_sided ? 1.0f : 0.0f;
+  }
+}
+
+namespace {
+
+using Eight = float __attribute__((vector_size(32)));  // the compiler splits it where registers are narrower
+using EightBits = int32_t __attribute__((vector_size(32)));
+
+Eight load(const std::vector<float>& column, uint32_t at) {
+  Eight v;
+  __builtin_memcpy(&v, column.data() + at, sizeof(v));
+  return v;
+}
+Eight root(Eight v) {
+  for (int i = 0; i < 8; ++i) v[i] = std::sqrt(v[i]);
+  return v;
+}
+Eight least(Eight a, Eight b) { return a < b ? a : b; }
+Eight most(Eight a, Eight b) { return a > b ? a : b; }
+
+}  // namespace
+
+/// light_importance() of eight lights at once.
+float LightTree::weigh(uint32_t first, uint32_t count, const Vec3& p, const Vec3& n, Weights& weights) const {
+  const Eight zero = {}, one = zero + 1.0f;
+  const bool one_side = n.x != 0.0f || n.y != 0.0f || n.z != 0.0f;
+  float sum = 0.0f;
+  for (uint32_t block = 0; block < count; block += 8) {
+    const uint32_t at = first + block;
+    const Columns& c = columns_;
+    const Eight x = p.x - load(c.center_x, at), y = p.y - load(c.center_y, at), z = p.z - load(c.center_z, at);
+    const Eight r2 = load(c.radius2, at), cos_n = load(c.cos_normals, at), sin_n = load(c.sin_normals, at);
+    const Eight d2 = x * x + y * y + z * z, share = least(r2 / most(d2, zero + 1e-37f), one);
+    const EightBits outside = share < one;
+    const Eight sin_box = root(share), cos_box = root(one - share), inverse_d = one / root(most(d2, zero + 1e-37f));
+
+    Eight cosine = (load(c.axis_x, at) * x + load(c.axis_y, at) * y + load(c.axis_z, at) * z) * inverse_d;
+    cosine = load(c.two_sided, at) > zero ? most(cosine, -cosine) : cosine;
+    cosine = most(least(cosine, one), -one);
+    const Eight sine = root(one - cosine * cosine);
+    const EightBits within = cosine > cos_n;
+    const Eight cos_x = within ? one : cosine * cos_n + sine * sin_n;
+    const Eight sin_x = within ? zero : sine * cos_n - cosine * sin_n;
+    const Eight nearest = cos_x > cos_box ? one : cos_x * cos_box + sin_x * sin_box;
+    // A cone of normals wider than a half turn together with the box can go beyond what the cosines can say.
+    const Eight directed = nearest > load(c.cos_emission, at) ? most(nearest, zero) : -one;
+    const Eight cos_out = (outside & (cos_n > -one)) ? directed : one;
+
+    Eight cos_in = one;
+    if (one_side) {
+      const Eight k = most(least(-(n.x * x + n.y * y + n.z * z) * inverse_d, one), -one);
+      const Eight facing = k > cos_box ? one : k * cos_box + root(one - k * k) * sin_box;
+      cos_in = outside ? facing : one;
+    }
+    const Eight intensity = load(c.intensity, at);
+    const Eight w = most(intensity * cos_out * cos_in / most(d2, most(r2, zero + 1e-30f)), zero + 1e-35f);
+    const Eight alive = ((cos_out >= zero) & (cos_in > zero) & (intensity > zero)) ? w : zero;
+    for (uint32_t i = 0; i < 8; ++i) weights[block + i] = alive[i];
+  }
+  for (uint32_t i = 0; i < count; ++i) sum += weights[i];
+  return sum;
+}
+
 void LightTree::build(std::span<const LightBounds> lights) {
   nodes_.clear();
   order_.resize(lights.size());
@@ -117,6 +196,7 @@ void LightTree::build(std::span<const LightBounds> lights) {
   nodes_.reserve(lights.size() / 2 + 1);
   nodes_.emplace_back();
   build_node(0, 0, uint32_t(lights.size()));
+  columns_.fill(lights_);
   for (uint32_t place = 0; place < order_.size(); ++place) place_[order_[place]] = place;
 }
 
@@ -193,9 +273,8 @@ float LightTree::importance(const Vec3& position, const Vec3& normal) const {
       sum += light_importance(nodes_[child].bounds, position, normal);
     return sum;
   }
-  float sum = 0.0f;
-  for (uint32_t i = 0; i < nodes_[0].count; ++i) sum += light_importance(lights_[i], position, normal);
-  return sum;
+  Weights weights;
+  return weigh(nodes_[0].first, nodes_[0].count, position, normal, weights);
 }
 
 uint32_t LightTree::sample(const Vec3& position, const Vec3& normal, float u, float& probability) const {
@@ -214,10 +293,8 @@ uint32_t LightTree::sample(const Vec3& position, const Vec3& normal, float u, fl
       node = child + 1, probability *= b / (a + b), u = std::clamp((u - p) / (1.0f - p), 0.0f, 0x1.fffffep-1f);
     }
   }
-  std::array<float, kSingleLeaf> weight;
-  float sum = 0.0f;
-  for (uint32_t i = 0; i < node->count; ++i)
-    sum += weight[i] = light_importance(lights_[node->first + i], position, normal);
+  Weights weight;
+  const float sum = weigh(node->first, node->count, position, normal, weight);
   if (!(sum > 0.0f)) return kNone;
   float target = u * sum;
   uint32_t chosen = kNone;
@@ -234,12 +311,9 @@ uint32_t LightTree::sample(const Vec3& position, const Vec3& normal, float u, fl
 float LightTree::probability(uint32_t light, const Vec3& position, const Vec3& normal) const {
   const uint32_t place = place_[light];
   uint32_t node = leaf_[place];
-  float sum = 0.0f, own = 0.0f;
-  for (uint32_t i = nodes_[node].first; i < nodes_[node].first + nodes_[node].count; ++i) {
-    const float w = light_importance(lights_[i], position, normal);
-    sum += w;
-    if (i == place) own = w;
-  }
+  Weights weights;
+  const float sum = weigh(nodes_[node].first, nodes_[node].count, position, normal, weights);
+  const float own = weights[place - nodes_[node].first];
   if (!(own > 0.0f)) return 0.0f;
   float probability = own / sum;
   for (; nodes_[node].parent != kNone; node = nodes_[node].parent) {
@@ -252,7 +326,8 @@ float LightTree::probability(uint32_t light, const Vec3& position, const Vec3& n
 }
 
 size_t LightTree::bytes() const {
-  return nodes_.capacity() * sizeof(Node) + lights_.capacity() * sizeof(LightBounds) + order_.capacity() * 4 * 3;
+  return nodes_.capacity() * sizeof(Node) + columns_.bytes() + lights_.capacity() * sizeof(LightBounds) +
+         order_.capacity() * 4 * 3;
 }
 
 }  // namespace afterglow

@@ -46,11 +46,22 @@ class LightTree {
     LightBounds bounds;
     uint32_t first = 0, count = 0, parent = kNone;
   };
+  /// What a leaf's estimates need, one array a value, so that eight lights are weighed at once.
+  struct Columns {
+    std::vector<float> center_x, center_y, center_z, radius2, axis_x, axis_y, axis_z, cos_normals, sin_normals,
+        cos_emission, intensity, two_sided;
+    void fill(std::span<const LightBounds>);
+    size_t bytes() const { return 12 * sizeof(float) * intensity.capacity(); }
+  };
+  using Weights = float[16];
+  /// Estimates of the `count` lights from place `first` on; their sum.
+  float weigh(uint32_t first, uint32_t count, const Vec3& position, const Vec3& normal, Weights&) const;
   uint32_t build_node(uint32_t node, uint32_t begin, uint32_t end);
   uint32_t split(uint32_t begin, uint32_t end, const LightBounds& all);
 
   std::vector<Node> nodes_;
   std::vector<LightBounds> lights_;  // in the order of leaves
+  Columns columns_;                  // the same
   std::vector<uint32_t> order_;      // place → caller's index
   std::vector<uint32_t> place_;      // caller's index → place
   std::vector<uint32_t> leaf_;       // place → node

@@ -69,7 +69,12 @@ Vec2 active_uv(const Mesh& mesh, const SurfacePoint& at) {
 SurfacePoint surface_point(const Scene& scene, const Ray& ray, const Hit& hit, bool with_uv) {
   const InstanceRecord& record = scene.instances()[hit.instance];
   const Mesh& mesh = *record.mesh;
+  // All that will be missed in the caches is asked for at once.
   const uint32_t* vertex = &mesh.triangles[3 * size_t(hit.triangle)];
+  __builtin_prefetch(vertex);
+  if (!mesh.corners.empty()) __builtin_prefetch(&mesh.corners[3 * size_t(hit.triangle)]);
+  if (!mesh.smooth.empty()) __builtin_prefetch(&mesh.smooth[hit.triangle]);
+  if (!mesh.slots.empty()) __builtin_prefetch(&mesh.slots[hit.triangle]);
   const Vec3 &p0 = mesh.positions[vertex[0]], &p1 = mesh.positions[vertex[1]], &p2 = mesh.positions[vertex[2]];
   SurfacePoint point;
   point.u = hit.u;
