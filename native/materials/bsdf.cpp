@@ -71,8 +71,9 @@ float masking(const Lobe& lobe, const Vec3& o, const Vec3& i, float lambda_o) {
   if (lobe.distribution == Distribution::kGtr1) {  // fixed roughness of the masking, as its authors had it
     return 1.0f / ((1.0f + ggx_lambda(o, 0.0625f, 0.0625f)) * (1.0f + ggx_lambda(i, 0.0625f, 0.0625f)));
   }
-  const float lambda_i = ggx_lambda(i, lobe.alpha_x, lobe.alpha_y);
-  if (lobe.distribution == Distribution::kGgxSeparable) return 1.0f / ((1.0f + lambda_o) * (1.0f + lambda_i));
+  const float lambda_i = is_beckmann(lobe.distribution) ? beckmann_lambda(i, lobe.alpha_x, lobe.alpha_y)
+                                                        : ggx_lambda(i, lobe.alpha_x, lobe.alpha_y);
+  if (lobe.distribution == Distribution::kGgxSeparable || lobe.distribution == Distribution::kBeckmannSeparable) return 1.0f / ((1.0f + lambda_o) * (1.0f + lambda_i));
   return 1.0f / (1.0f + lambda_o + lambda_i);
 }
 
@@ -107,9 +108,11 @@ LobeValue microfacet_value(const Lobe& lobe, const Vec3& outgoing, const Vec3& i
   if (h.z < 0.0f) h = -h;
   const float oh = glm::dot(o, h), ih = glm::dot(i, h);
   if (oh <= 0.0f || (transmitted && ih >= 0.0f)) return result;
-  const float lambda_o = ggx_lambda(o, lobe.alpha_x, lobe.alpha_y);
-  const float d = lobe.distribution == Distribution::kGtr1 ? gtr1_distribution(h.z, lobe.alpha_x)
-                                                           : ggx_distribution(h, lobe.alpha_x, lobe.alpha_y);
+  const bool beckmann = is_beckmann(lobe.distribution), gtr1 = lobe.distribution == Distribution::kGtr1;
+  const float lambda_o = beckmann ? beckmann_lambda(o, lobe.alpha_x, lobe.alpha_y) : ggx_lambda(o, lobe.alpha_x, lobe.alpha_y);
+  const float d = gtr1       ? gtr1_distribution(h.z, lobe.alpha_x)
+                  : beckmann ? beckmann_distribution(h, lobe.alpha_x, lobe.alpha_y)
+                             : ggx_distribution(h, lobe.alpha_x, lobe.alpha_y);
   const float jacobian = transmitted ? oh * sqr(lobe.ior) * -ih / sqr(oh + lobe.ior * ih) : 0.25f;
   const float common = d * jacobian / o.z;
   Rgb f = fresnel(lobe, oh);
@@ -123,7 +126,8 @@ LobeValue microfacet_value(const Lobe& lobe, const Vec3& outgoing, const Vec3& i
     f = lobe.fresnel == Fresnel::kNone ? lobe.f90 : (Rgb(1.0f) - f) * lobe.f90;
   }
   result.value = f * (common * masking(lobe, o, i, lambda_o));
-  result.density = chance * (lobe.distribution == Distribution::kGtr1 ? d * h.z / (4.0f * oh) : common / (1.0f + lambda_o));
+  // Without visible normals the density is D cos: `common` holds jacobian × oh / o.z.
+  result.density = chance * (gtr1 || beckmann ? common * h.z * o.z / oh : common / (1.0f + lambda_o));
   return result;
 }
 
@@ -167,7 +171,7 @@ LobeValue lobe_value(const Lobe& lobe, const Vec3& face, const Vec3& o, const Ve
 }
 
 LobeClass pass_of(const Lobe& lobe, bool transmitted) {
-  return lobe.kind == LobeKind::kMicrofacetGlass ? (transmitted ? LobeClass::kTransmission : LobeClass::kGlossy) : lobe.pass;
+  return lobe.kind == LobeKind::kMicrofacetGlass && !lobe.one_pass ? (transmitted ? LobeClass::kTransmission : LobeClass::kGlossy) : lobe.pass;
 }
 
 void add(BsdfValue& total, LobeClass pass, const Rgb& value) {
@@ -196,6 +200,8 @@ Choice sample_microfacet(const Lobe& lobe, const Vec3& outgoing, float u_lobe, c
     const float c2 = a2 >= 1.0f ? u.y : (1.0f - std::pow(a2, 1.0f - u.y)) / (1.0f - a2);
     const float s = std::sqrt(saturate(1.0f - c2));
     h = {s * std::cos(phi), s * std::sin(phi), std::sqrt(saturate(c2))};
+  } else if (!choice.delta && is_beckmann(lobe.distribution)) {
+    h = beckmann_sample(lobe.alpha_x, lobe.alpha_y, u);
   } else if (!choice.delta) {
     h = ggx_sample(o, lobe.alpha_x, lobe.alpha_y, u);
   }
@@ -310,6 +316,7 @@ namespace {
 /// The Fresnel term averaged over the microfacets that are seen, as Blender's colour passes have it.
 Rgb mean_fresnel(const Lobe& lobe, float cosine) {
   if (lobe.fresnel == Fresnel::kNone) return Rgb(1.0f);
+  if (lobe.kind == LobeKind::kMicrofacetReflection && lobe.distribution == Distribution::kGgxSeparable) return Rgb(1.0f);
   if (lobe.fresnel == Fresnel::kConductor || lobe.distribution != Distribution::kGgx) return fresnel(lobe, cosine);
   const float roughness = std::sqrt(std::sqrt(lobe.alpha_x * lobe.alpha_y));
   if (lobe.fresnel == Fresnel::kF82) return lerp(lobe.f0, Rgb(1.0f), schlick_share(cosine, roughness, 1.5f));
@@ -326,7 +333,6 @@ SurfaceAlbedo albedo(const Surface& surface, const Vec3& outgoing) {
   for (int k = 0; k < surface.count; ++k) {
     const Lobe& lobe = surface.lobes[k];
     if (lobe.kind < LobeKind::kMicrofacetReflection) {
-      if (lobe.kind == LobeKind::kSheenV1) continue;  // as Blender counts it: next to nothing
       result.diffuse += lobe.weight;
       continue;
     }
@@ -338,6 +344,10 @@ SurfaceAlbedo albedo(const Surface& surface, const Vec3& outgoing) {
       result.transmission += weight * (lobe.fresnel == Fresnel::kNone ? lobe.f90 : (Rgb(1.0f) - f) * lobe.f90);
     } else {
       Rgb r, t;
+      if (lobe.one_pass) {
+        result.transmission += weight * lobe.f90;
+        continue;
+      }
       reflect_chance(lobe, f, r, t);
       result.glossy += weight * r;
       reflect_chance(lobe, fresnel(lobe, saturate(glm::dot(lobe.normal, outgoing))), r, t);

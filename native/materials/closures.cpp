@@ -118,6 +118,11 @@ void add_diffuse(const Operands& in, const Common& c, LobeKind kind) {
   push_lobe(c.surface, lobe);
 }
 
+void set_distribution(Lobe& lobe, uint32_t which, uint32_t version) {
+  if (which == 3) lobe.distribution = version == 1 ? Distribution::kBeckmannSeparable : Distribution::kBeckmann;
+  else if (version == 1 && which != 1) lobe.distribution = Distribution::kGgxSeparable;
+}
+
 /// weight, colour, normal, roughness, anisotropy, rotation; distribution, version
 void add_glossy(const Operands& in, const Common& c) {
   if (c.hit.path && c.hit.path->drop_glossy) return;
@@ -132,7 +137,7 @@ void add_glossy(const Operands& in, const Common& c) {
   if (lobe.alpha_x != lobe.alpha_y && !in.given(6)) {
     set_anisotropy(lobe, roughness, in.f(4), in.f(5), default_tangent(c.hit), false);
   }
-  if (in.u(8) == 1) lobe.distribution = Distribution::kGgxSeparable;
+  set_distribution(lobe, in.u(7), in.u(8));
   if (in.u(7) == 1 && roughness > 0.0f) compensate(lobe, c.point.outgoing, saturate(c.color));
   lobe.sampling_weight = mean(lobe.weight);
   push_lobe(c.surface, lobe);
@@ -163,7 +168,8 @@ void add_glass(const Operands& in, const Common& c, bool refraction_only) {
     lobe.f90 = no_refraction ? Rgb(0.0f) : c.color;
     if (in.u(5) == 1 && lobe.alpha_x > 0.0f) compensate(lobe, c.point.outgoing, saturate(c.color));
   }
-  if (in.u(6) == 1) lobe.distribution = Distribution::kGgxSeparable;
+  set_distribution(lobe, in.u(5), in.u(6));
+  lobe.one_pass = in.u(5) == 1 && in.u(6) == 1;
   lobe.sampling_weight = mean(lobe.weight) * std::fmax(mean(c.color), 1e-3f);
   push_lobe(c.surface, lobe);
 }
@@ -190,6 +196,7 @@ void add_metallic(const Operands& in, const Common& c) {
     mean_fresnel = saturate(lerp(lobe.f0, Rgb(1.0f), 1.0f / 21.0f) - lobe.f90 * (1.0f / 126.0f));
   }
   lobe.sampling_weight = mean(lobe.weight * fresnel(lobe, saturate(glm::dot(lobe.normal, c.point.outgoing))));
+  set_distribution(lobe, in.u(10), 2);
   if (in.u(10) == 1) compensate(lobe, c.point.outgoing, mean_fresnel);
   push_lobe(c.surface, lobe);
 }

@@ -63,6 +63,25 @@ inline float ggx_distribution(const Vec3& h, float ax, float ay) {
   const float s = sqr(h.x / ax) + sqr(h.y / ay) + sqr(h.z);
   return kInvPi / (ax * ay * s * s);
 }
+/// Beckmann's distribution, and its masking by the rational fit of Walter et al. 2007.
+inline float beckmann_distribution(const Vec3& h, float ax, float ay) {
+  const float c2 = sqr(h.z);
+  if (!(c2 > 1e-12f)) return 0.0f;
+  return std::exp(-(sqr(h.x / ax) + sqr(h.y / ay)) / c2) * kInvPi / (ax * ay * c2 * c2);
+}
+inline float beckmann_lambda(const Vec3& v, float ax, float ay) {
+  const float t = (sqr(ax * v.x) + sqr(ay * v.y)) / sqr(v.z);
+  if (t < 0.390625f) return 0.0f;
+  const float a = 1.0f / std::sqrt(t);
+  return (1.0f - a * (1.259f - 0.396f * a)) / (a * (3.535f + 2.181f * a));
+}
+/// A normal with density D(h) cos(h).
+inline Vec3 beckmann_sample(float ax, float ay, const Vec2& u) {
+  const float r = std::sqrt(-std::log(std::fmax(1.0f - u.y, 1e-7f))), phi = 2.0f * kPi * u.x;
+  return glm::normalize(Vec3(ax * r * std::cos(phi), ay * r * std::sin(phi), 1.0f));
+}
+inline bool is_beckmann(Distribution d) { return d == Distribution::kBeckmann || d == Distribution::kBeckmannSeparable; }
+
 /// A visible normal for the direction o (o.z > 0), with density G1(o) D(h) (o·h) / o.z.
 inline Vec3 ggx_sample(const Vec3& o, float ax, float ay, const Vec2& u) {
   const Vec3 w = glm::normalize(Vec3(ax * o.x, ay * o.y, o.z));

@@ -22,12 +22,13 @@ void Emitter::closure(Op op, std::vector<Operand> inputs, std::vector<uint32_t> 
   drafts.push_back({op, {kNone, kNone}, std::move(inputs), std::move(params)});
 }
 
-/// 0: plain GGX, 1: with compensation, 2: a mirror.
+/// 0: plain GGX, 1: with compensation, 2: a mirror, 3: Beckmann.
 uint32_t Emitter::distribution(const char* missing) const {
   const std::string name = text("distribution", missing);
   if (name == "multi_ggx" || name == "multiscatter_ggx") return 1;
   if (name == "sharp") return 2;
-  if (name == "beckmann" || name == "ashikhmin_shirley") warn("distribution \"" + name + "\" is rendered as GGX");
+  if (name == "beckmann") return 3;
+  if (name == "ashikhmin_shirley") warn("distribution \"" + name + "\" is rendered as GGX");
   return 0;
 }
 

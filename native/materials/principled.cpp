@@ -190,6 +190,7 @@ void add_principled_v1(const Operands& in, const HitContext& hit, Surface& surfa
   const float through = transmission * (1.0f - metallic), diffuse = (1.0f - metallic) * (1.0f - transmission);
   const float gray = 0.3f * base.x + 0.6f * base.y + 0.1f * base.z;
   const Rgb hue = gray > 0.0f ? base / gray : Rgb(1.0f);
+  const Rgb sheen_hue = luminance(base) > 0.0f ? base / luminance(base) : Rgb(1.0f);
 
   if (diffuse > kLeastWeight) {
     Lobe lobe;
@@ -201,7 +202,7 @@ void add_principled_v1(const Operands& in, const HitContext& hit, Surface& surfa
     push_lobe(surface, lobe);
     if (const float sheen = in.f(kSheenWeight); sheen > kLeastWeight) {
       lobe.kind = LobeKind::kSheenV1;
-      lobe.weight = lerp(Rgb(1.0f), hue, in.f(kSheenTint)) * (weight * sheen * diffuse);
+      lobe.weight = lerp(Rgb(1.0f), sheen_hue, in.f(kSheenTint)) * (weight * sheen * diffuse);
       lobe.sampling_weight = 0.05f * mean(lobe.weight);
       push_lobe(surface, lobe);
     }
@@ -224,10 +225,30 @@ void add_principled_v1(const Operands& in, const HitContext& hit, Surface& surfa
     lobe.f0 = lerp(Rgb(1.0f), hue, in.f(kSpecularTint)) * (0.08f * specular * (1.0f - metallic)) + base * metallic;
     lobe.weight = Rgb(weight * specular_weight);
     finish(lobe);
-    if (multi && roughness > 0.1f) compensate(lobe, o, saturate(lerp(lobe.f0, Rgb(1.0f), 0.05f)));
+    if (multi) {
+      lobe.distribution = Distribution::kGgx;
+      compensate(lobe, o, saturate(base));  // later bounces took the base colour
+    }
     push_lobe(surface, lobe);
   }
-  if (through > kLeastWeight) {
+  if (through > kLeastWeight && multi && roughness > 0.05f) {  // one lobe, and its whole light counts as transmission
+    if (!(no_glossy && no_refraction)) {
+      Lobe lobe = reflection(normal, hit);
+      lobe.kind = LobeKind::kMicrofacetGlass;
+      lobe.pass = LobeClass::kTransmission;
+      lobe.one_pass = true, lobe.bumped = bumped;
+      lobe.alpha_x = lobe.alpha_y = sqr(roughness);
+      lobe.ior = point.backfacing ? 1.0f / ior : ior;
+      if (std::fabs(lobe.ior - 1.0f) < 1e-4f) lobe.alpha_x = lobe.alpha_y = 0.0f;
+      lobe.fresnel = Fresnel::kDielectric;
+      lobe.f0 = no_glossy ? Rgb(0.0f) : lerp(Rgb(1.0f), base, in.f(kSpecularTint));
+      lobe.f90 = no_refraction ? Rgb(0.0f) : base;
+      lobe.weight = Rgb(weight * through);
+      lobe.sampling_weight = mean(lobe.weight);
+      if (lobe.alpha_x > 0.0f) compensate(lobe, o, glm::sqrt(saturate(base)));
+      push_lobe(surface, lobe);
+    }
+  } else if (through > kLeastWeight) {
     const float eta = point.backfacing ? 1.0f / ior : ior;
     const float f = fresnel_dielectric(saturate(glm::dot(normal, o)), eta);
     if (!no_glossy) {

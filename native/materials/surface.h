@@ -37,6 +37,8 @@ enum class Fresnel : uint8_t {
 enum class Distribution : uint8_t {
   kGgx,           // height-correlated Smith
   kGgxSeparable,  // masking and shadowing apart, as Blender before 4.0
+  kBeckmann,
+  kBeckmannSeparable,
   kGtr1,          // clearcoat before 4.0
 };
 
@@ -48,6 +50,7 @@ struct alignas(16) Lobe {
   LobeClass pass = LobeClass::kDiffuse;
   Fresnel fresnel = Fresnel::kNone;
   Distribution distribution = Distribution::kGgx;
+  bool one_pass = false;         // glass that counts as transmission whole: multiple scattering before Blender 4.0
   bool bumped = false;           // its normal comes from a map or a bump: diffuse light is shadowed smoothly
   float sampling_weight = 0.0f;  // relative; sums to 1 over a Surface
   Rgb weight{0.0f};
