@@ -9,8 +9,23 @@
 
 namespace afterglow {
 
+namespace {
+
+constexpr float kMostWeight = 1e10f;  // above, products of lobes would overflow
+
+/// Nothing that is no number, or so large that it soon would be none.
+bool usable(const Lobe& lobe) {
+  const float sum = lobe.weight.x + lobe.weight.y + lobe.weight.z;
+  const float shape = lobe.alpha_x + lobe.alpha_y + lobe.ior + lobe.f0.x + lobe.f0.y + lobe.f0.z + lobe.f90.x + lobe.f90.y +
+                      lobe.f90.z + lobe.sampling_weight + lobe.normal.x + lobe.tangent.x;
+  return max_component(lobe.weight) > kLeastWeight && sum < kMostWeight && std::fabs(shape) < kMostWeight &&
+         std::isfinite(lobe.energy);
+}
+
+}  // namespace
+
 void push_lobe(Surface& surface, const Lobe& lobe) {
-  if (!(max_component(lobe.weight) > kLeastWeight) || !is_finite(lobe.weight)) return;
+  if (!usable(lobe)) return;
   if (lobe.kind == LobeKind::kLambert || lobe.kind == LobeKind::kTranslucent) {
     for (int k = 0; k < surface.count; ++k) {
       Lobe& other = surface.lobes[k];
@@ -156,7 +171,7 @@ void add_glass(const Operands& in, const Common& c, bool refraction_only) {
   if (!refraction_only) lobe.normal = reflecting_normal(lobe.normal, c.point.face_normal, c.point.outgoing);
   const float roughness = in.u(5) == 2 ? 0.0f : in.f(3);
   lobe.alpha_x = lobe.alpha_y = sqr(saturate(roughness));
-  const float ior = std::fmax(in.f(4), 1e-5f);
+  const float ior = std::fmin(std::fmax(in.f(4), 1e-5f), 1e5f);
   lobe.ior = c.point.backfacing ? 1.0f / ior : ior;
   if (std::fabs(lobe.ior - 1.0f) < 1e-4f) lobe.alpha_x = lobe.alpha_y = 0.0f;  // nothing bends: straight on
   lobe.weight = Rgb(c.weight);
@@ -217,7 +232,7 @@ void add_sheen(const Operands& in, const Common& c) {
 
 void add_closure(Op op, const Operands& in, const HitContext& hit, Surface& surface) {
   const float weight = in.f(0);
-  if (!(weight > kLeastWeight)) return;
+  if (!(weight > kLeastWeight && weight < kMostWeight)) return;
   const SurfacePoint& point = *hit.points[0];
   if (op == Op::kPrincipled) {
     if (in.u(kParamVersion) == 1) add_principled_v1(in, hit, surface);
@@ -239,10 +254,13 @@ void add_closure(Op op, const Operands& in, const HitContext& hit, Surface& surf
     case Op::kRefraction: return add_glass(in, common, true);
     case Op::kMetallic: return add_metallic(in, common);
     case Op::kSheenLobe: return add_sheen(in, common);
-    case Op::kTransparent: surface.transparency += color * weight; return;
+    case Op::kTransparent:
+      if (max_component(color) * weight < kMostWeight) surface.transparency += color * weight;
+      return;
     case Op::kEmission: {
       const float strength = in.f(2);
-      if (strength > 0.0f && std::isfinite(strength)) surface.emission += color * (weight * strength);
+      const Rgb light = color * (weight * strength);
+      if (strength > 0.0f && is_finite(light)) surface.emission += light;
       return;
     }
     default: return;

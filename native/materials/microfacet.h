@@ -8,7 +8,7 @@
 namespace afterglow {
 
 inline float sqr(float x) { return x * x; }
-inline float saturate(float x) { return x < 0.0f ? 0.0f : (x > 1.0f ? 1.0f : x); }  // NaN stays NaN
+inline float saturate(float x) { return x > 0.0f ? (x < 1.0f ? x : 1.0f) : 0.0f; }  // NaN: 0
 inline Rgb saturate(const Rgb& c) { return {saturate(c.x), saturate(c.y), saturate(c.z)}; }
 inline Rgb lerp(const Rgb& a, const Rgb& b, float t) { return a + (b - a) * t; }
 inline float mean(const Rgb& c) { return (c.x + c.y + c.z) * (1.0f / 3.0f); }

@@ -83,7 +83,7 @@ void wave(Emitter& e) {
                                      e.input("distortion", Type::kFloat, 0.0f), e.input("detail", Type::kFloat, 2.0f),
                                      e.input("detail_scale", Type::kFloat, 1.0f), e.input("detail_roughness", Type::kFloat, 0.5f),
                                      e.input("phase_offset", Type::kFloat, 0.0f)},
-                                    {rings, direction, among(e, "wave_profile", "sin", kProfiles)});
+                                    {rings, direction, among(e, e.node().params.count("profile") ? "profile" : "wave_profile", "sin", kProfiles)});
   e.output("color", Type::kColor, color);
   e.output("fac", Type::kFloat, fac);
 }
@@ -96,7 +96,7 @@ void gradient(Emitter& e) {
 }
 
 void magic(Emitter& e) {
-  const uint32_t depth = uint32_t(std::clamp(e.number("turbulence_depth", 2.0), 0.0, 10.0));
+  const uint32_t depth = uint32_t(std::clamp(e.number("depth", e.number("turbulence_depth", 2.0)), 0.0, 10.0));
   const auto [color, fac] = e.emit2(Op::kMagic, {texture_coordinates(e, false), e.input("scale", Type::kFloat, 5.0f),
                                                  e.input("distortion", Type::kFloat, 1.0f)}, {depth});
   e.output("color", Type::kColor, color);

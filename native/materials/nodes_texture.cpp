@@ -48,7 +48,8 @@ void image_texture(Emitter& e) {
   const uint32_t outside = extension == "extend" ? 1u : extension == "clip" ? 2u : extension == "mirror" ? 3u : 0u;
   const auto [color, alpha] = e.emit2(Op::kImage, {texture_coordinates(e, how == 0)},
                                       {image_number(e), interpolation(e), outside, how,
-                                       Emitter::bits(float(e.number("projection_blend", 0.0))), output_linked(e, "alpha")});
+                                       Emitter::bits(float(e.number("projection_blend", 0.0))),
+                                       e.flag("unassociate", output_linked(e, "alpha"))});
   e.output("color", Type::kColor, color);
   e.output("alpha", Type::kFloat, alpha);
 }

@@ -44,15 +44,15 @@ void add_principled(const Operands& in, const HitContext& hit, Surface& surface)
   const float alpha = saturate(in.f(kAlpha));
   if (alpha < 1.0f) surface.transparency += Rgb(in.f(kWeight) * (1.0f - alpha));
   Rgb weight(in.f(kWeight) * alpha);
-  if (!(weight.x > kLeastWeight)) return;
+  if (!(weight.x > kLeastWeight && weight.x < 1e10f)) return;
   bool bumped, coat_bumped;
   const Vec3 normal = closure_normal(in, kNormalIn, point, bumped);
   const Vec3 coat_normal = closure_normal(in, kCoatNormal, point, coat_bumped);
   const Rgb base = positive(in.v(kBaseColor)), clamped = saturate(base), tint = positive(in.v(kSpecularTint));
   const float roughness = saturate(in.f(kRoughness));
-  const float ior = std::fmax(in.f(kIor), 1e-5f);
+  const float ior = std::fmin(std::fmax(in.f(kIor), 1e-5f), 1e5f);
 
-  if (const float sheen = in.f(kSheenWeight); sheen > kLeastWeight) {
+  if (const float sheen = std::fmin(in.f(kSheenWeight), 1e3f); sheen > kLeastWeight) {
     Lobe lobe;
     lobe.kind = LobeKind::kSheen;
     const float coat = saturate(in.f(kCoatWeight));
@@ -67,8 +67,8 @@ void add_principled(const Operands& in, const HitContext& hit, Surface& surface)
       weight = under(weight, lobe.weight);
     }
   }
-  if (const float coat = std::fmax(in.f(kCoatWeight), 0.0f); coat > kLeastWeight) {
-    const float coat_ior = std::fmax(in.f(kCoatIor), 1.0f);
+  if (const float coat = std::fmin(std::fmax(in.f(kCoatWeight), 0.0f), 1e3f); coat > kLeastWeight) {
+    const float coat_ior = std::fmin(std::fmax(in.f(kCoatIor), 1.0f), 1e3f);
     if (!no_glossy) {
       Lobe lobe = reflection(coat_normal, hit);
       lobe.bumped = coat_bumped;
@@ -90,8 +90,8 @@ void add_principled(const Operands& in, const HitContext& hit, Surface& surface)
     }
   }
   if (const float strength = in.f(kEmissionStrength); strength > 0.0f && std::isfinite(strength)) {
-    const Rgb emitted = positive(in.v(kEmissionColor)) * strength;
-    if (is_finite(emitted)) surface.emission += weight * emitted;
+    const Rgb emitted = weight * positive(in.v(kEmissionColor)) * strength;
+    if (is_finite(emitted)) surface.emission += emitted;
   }
   const bool anisotropic = in.f(kAnisotropic) > 1e-4f;
   const Vec3 tangent = !anisotropic ? Vec3(1, 0, 0) : (in.given(kTangentIn) ? in.v(kTangentIn) : default_tangent(hit));
@@ -137,7 +137,7 @@ void add_principled(const Operands& in, const HitContext& hit, Surface& surface)
   }
   if (!no_glossy && max_component(weight) > kLeastWeight) {
     float f0 = f0_from_ior(ior), eta = ior;
-    if (const float level = std::fmax(in.f(kSpecularLevel), 0.0f); level != 0.5f) {
+    if (const float level = std::fmin(std::fmax(in.f(kSpecularLevel), 0.0f), 1e3f); level != 0.5f) {
       f0 *= 2.0f * level;
       eta = ior_from_f0(f0);
       if (ior < 1.0f) eta = 1.0f / eta;
@@ -186,7 +186,7 @@ void add_principled_v1(const Operands& in, const HitContext& hit, Surface& surfa
   const Vec3 normal = closure_normal(in, kNormalIn, point, bumped);
   const Rgb base = positive(in.v(kBaseColor));
   const float metallic = saturate(in.f(kMetallicIn)), transmission = saturate(in.f(kTransmissionWeight));
-  const float roughness = saturate(in.f(kRoughness)), ior = std::fmax(in.f(kIor), 1e-5f);
+  const float roughness = saturate(in.f(kRoughness)), ior = std::fmin(std::fmax(in.f(kIor), 1e-5f), 1e5f);
   const float through = transmission * (1.0f - metallic), diffuse = (1.0f - metallic) * (1.0f - transmission);
   const float gray = 0.3f * base.x + 0.6f * base.y + 0.1f * base.z;
   const Rgb hue = gray > 0.0f ? base / gray : Rgb(1.0f);
@@ -200,7 +200,7 @@ void add_principled_v1(const Operands& in, const HitContext& hit, Surface& surfa
     lobe.weight = base * (weight * diffuse);
     lobe.sampling_weight = mean(lobe.weight);
     push_lobe(surface, lobe);
-    if (const float sheen = in.f(kSheenWeight); sheen > kLeastWeight) {
+    if (const float sheen = std::fmin(in.f(kSheenWeight), 1e3f); sheen > kLeastWeight) {
       lobe.kind = LobeKind::kSheenV1;
       lobe.weight = lerp(Rgb(1.0f), sheen_hue, in.f(kSheenTint)) * (weight * sheen * diffuse);
       lobe.sampling_weight = 0.05f * mean(lobe.weight);
@@ -273,7 +273,7 @@ void add_principled_v1(const Operands& in, const HitContext& hit, Surface& surfa
       push_lobe(surface, lobe);
     }
   }
-  if (const float coat = in.f(kCoatWeight); coat > kLeastWeight && !no_glossy) {
+  if (const float coat = std::fmin(in.f(kCoatWeight), 1e3f); coat > kLeastWeight && !no_glossy) {
     Lobe lobe = reflection(closure_normal(in, kCoatNormal, point, coat_bumped), hit);
     lobe.alpha_x = lobe.alpha_y = sqr(saturate(in.f(kCoatRoughness)));
     lobe.fresnel = Fresnel::kSchlick;

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import bpy
+
 from .compiler import Compiler, NodeView, Source, is_link
 
 Outputs = dict[str, Source]
@@ -36,6 +38,11 @@ def distribution(node: Any) -> str:
     return DISTRIBUTIONS.get(getattr(node, "distribution", "GGX"), "ggx")
 
 
+def generation(kind: str) -> int:
+    """1: what the node meant before Blender 4.0 (diffuse: 4.3, when rough surfaces began to keep their energy)."""
+    return 1 if bpy.app.version < ((4, 3, 0) if kind == "diffuse_bsdf" else (4, 0, 0)) else 2
+
+
 def principled_node(compiler: Compiler, view: NodeView) -> Outputs:
     first = view.has("Specular") and not view.has("Specular IOR Level")
     names = PRINCIPLED_1 if first else PRINCIPLED_2
@@ -57,7 +64,9 @@ def closure(kind: str, inputs: dict[str, str], output: str = "BSDF", with_distri
         if said:
             compiler.context.warn_once(f"node '{view.node.name}' ({view.node.bl_label}) is not supported yet: {said}")
         given = {native: view.input(name) for name, native in inputs.items() if view.has(name)}
-        params = {"distribution": distribution(view.node)} if with_distribution else {}
+        params: dict[str, Any] = {"version": generation(kind)}
+        if with_distribution:
+            params["distribution"] = distribution(view.node)
         return {output: compiler.link("shader", kind, view.node.name, given, **params)}
     return rule
 
