@@ -133,6 +133,7 @@ void sky(Emitter& e) {
     if (const std::vector<float>* s = e.table("sun_direction"); s && s->size() >= 3) sun = {(*s)[0], (*s)[1], (*s)[2]};
     numbers = preetham_parameters(sun, float(e.number("turbidity", 2.2)));
   } else {
+    if (kind == "multiple_scattering") e.warn("node \"" + e.node().name + "\": the sky is shown with single scattering");
     Atmosphere a;
     const auto number = [&](const char* name, float missing) { return float(e.number(name, missing)); };
     a.sun_elevation = number("sun_elevation", 0.2618f), a.sun_rotation = number("sun_rotation", 0.0f);

@@ -38,6 +38,7 @@ class Cancelled(Error): ...
 #             coat_normal sheen_weight sheen_roughness sheen_tint emission_color emission_strength subsurface_weight
 #             params: distribution "ggx" | "multi_ggx"; version 1 (Blender < 4.0: no layering by albedo, specular_ior_level
 #             holds "Specular", specular_tint and sheen_tint floats, transmission_roughness) or 2
+#             Every shader node takes the param version: 1 what it meant before Blender 4.0 (diffuse: 4.3), 2 (default) since.
 # diffuse_bsdf [shader] color roughness normal            glossy_bsdf [shader] color roughness anisotropy rotation normal
 #             params: distribution "ggx" | "multi_ggx" | "sharp" | "beckmann" | "ashikhmin_shirley"
 # glass_bsdf, refraction_bsdf [shader] color roughness ior normal   params: distribution
@@ -51,7 +52,15 @@ class Cancelled(Error): ...
 # environment_texture [color] vector   params: image, interpolation, projection "equirectangular"|"mirror_ball"
 # checker_texture [color fac] vector color1 color2 scale
 # noise_texture [fac color] vector w scale detail roughness lacunarity offset gain distortion  params: dimensions "1D".."4D", noise_type, normalize
-# voronoi_texture, wave_texture, gradient_texture, magic_texture, brick_texture, white_noise_texture, sky_texture (optional; fallback stated)
+# voronoi_texture [distance color position w radius] vector w scale detail roughness lacunarity smoothness exponent randomness
+#             params: dimensions, feature, distance (metric), normalize
+# wave_texture [color fac] vector scale distortion detail detail_scale detail_roughness phase_offset  params: wave_type
+#             bands_direction rings_direction profile        gradient_texture [color fac] vector  params: gradient_type
+# magic_texture [color fac] vector scale distortion  params: depth         white_noise_texture [value color] vector w  params: dimensions
+# brick_texture [color fac] vector color1 color2 mortar scale mortar_size mortar_smooth bias brick_width row_height
+#             params: offset offset_frequency squash squash_frequency
+# sky_texture [color] vector  params: sky_type preetham (sun_direction turbidity), others: sun_elevation sun_rotation sun_size
+#             sun_intensity sun_disc altitude air_density dust_density|aerosol_density ozone_density
 # texture_coordinate [generated normal uv object camera window reflection]   params: object_to_world 4×4 inverse or None
 # uv_map [uv] params: uv_map ("" = active)         attribute [color vector fac alpha] params: name, kind "geometry"|"object"|"instancer"|"view_layer"
 # color_attribute [color alpha] params: name       mapping [vector] vector location rotation scale  params: kind point|texture|vector|normal
@@ -227,8 +236,10 @@ def set_log(sink: Callable[[str, str], None] | None) -> None: ...
 def bsdf_evaluate(graph: Graph, wo: NDArray[np.float32], wi: NDArray[np.float32], **point: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """value × |cos| (N, 3) and density (N,) for directions in the local frame (z = normal)."""
 def bsdf_sample(graph: Graph, wo: NDArray[np.float32], u: NDArray[np.float32], **point: Any) -> dict[str, NDArray[Any]]: ...
-def evaluate_graph(graph: Graph, points: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float32]]:
-    """Emission, transparency and albedos of a material's graph at N points (uv, position, normal, incoming, …)."""
+def evaluate_graph(graph: Graph, points: Mapping[str, NDArray[Any]], **point: Any) -> dict[str, Any]:
+    """A material's graph at N points (position, normal, face_normal, incoming (N, 3), uv (N, 2); one row: for all). Returns
+    emission, transparency, diffuse, glossy, transmission (albedos), normal of the first lobe (N, 3), lobes (N,), warnings,
+    folded, instructions. Keywords as in bsdf_evaluate: backfacing, drop_glossy, drop_refractive, kind (of the ray), fold."""
 def light_sample(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32], u: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
     """Choices of a light and a direction from N points (arrays of one row stand for all): u (N, 3) are the choice and two
     numbers for the direction; normal 0: from all sides. valid, direction (N, 3), distance, radiance (N, 3), density

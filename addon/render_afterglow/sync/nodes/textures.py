@@ -172,7 +172,7 @@ RULES = {
         "sky_type": "sky_type", "turbidity": "turbidity", "ground_albedo": "ground_albedo", "sun_disc": "sun_disc",
         "sun_size": "sun_size", "sun_intensity": "sun_intensity", "sun_elevation": "sun_elevation",
         "sun_rotation": "sun_rotation", "altitude": "altitude", "air_density": "air_density", "dust_density": "dust_density",
-        "ozone_density": "ozone_density"}),
+        "aerosol_density": "aerosol_density", "ozone_density": "ozone_density", "sun_direction": "sun_direction"}),
     "ShaderNodeValToRGB": color_ramp_node,
     "ShaderNodeRGBCurve": curve_node("rgb_curve", 3, 3, "Color", "Color"),
     "ShaderNodeVectorCurve": curve_node("vector_curve", 3, None, "Vector", "Vector"),
