@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables of directional albedo, made on first use by quadrature over visible normals: a few ten milliseconds once, instead of
-// a binary blob in the repository. Kulla and Conty 2017; Turquin 2019.
+// Tables of directional albedo, made on first use by quadrature over visible normals: a few ten milliseconds once,
+// instead of a binary blob in the repository. Kulla and Conty 2017; Turquin 2019.
 #include "materials/albedo_tables.h"
 
 #include <vector>
@@ -10,8 +10,8 @@
 namespace afterglow {
 namespace {
 
-constexpr int kSide = 32;         // two-dimensional tables
-constexpr int kCube = 16;         // three-dimensional ones
+constexpr int kSide = 32;  // two-dimensional tables
+constexpr int kCube = 16;  // three-dimensional ones
 constexpr int kPlanePoints = 1024, kCubePoints = 384;
 constexpr float kLeastZ = 0.01f;  // Fresnel tables: sqrt(|ior − 1| / (ior + 1)) from here
 
@@ -164,7 +164,9 @@ const Reflection& reflection() {
 
 }  // namespace
 
-float ggx_albedo(float cosine, float roughness) { return reflection().albedo.at(axis_of_cosine(cosine), roughness, kSide); }
+float ggx_albedo(float cosine, float roughness) {
+  return reflection().albedo.at(axis_of_cosine(cosine), roughness, kSide);
+}
 
 float ggx_mean_albedo(float roughness) {
   const float f = saturate(roughness) * (kSide - 1);

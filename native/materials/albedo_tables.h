@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Directional albedos of the GGX distribution, integrated once when the program starts, for the layering of lobes and for
-// the compensation of what single scattering loses (Kulla and Conty 2017; Turquin 2019).
+// Directional albedos of the GGX distribution, integrated once when the program starts, for the layering of lobes and
+// for the compensation of what single scattering loses (Kulla and Conty 2017; Turquin 2019).
 #pragma once
 
 namespace afterglow {

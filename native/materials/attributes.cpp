@@ -24,10 +24,14 @@ AttributeSlot find_in(const Mesh& mesh, const std::string& name) {
 
 uint32_t element(const AttributeSlot& slot, const Mesh& mesh, uint32_t triangle, uint32_t k) {
   switch (slot.domain) {
-    case Domain::kVertex: return mesh.triangles[3 * triangle + k];
-    case Domain::kCorner: return mesh.corners.empty() ? 3 * triangle + k : mesh.corners[3 * triangle + k];
-    case Domain::kFace: return mesh.faces.empty() ? triangle : mesh.faces[triangle];
-    case Domain::kMesh: return 0;
+    case Domain::kVertex:
+      return mesh.triangles[3 * triangle + k];
+    case Domain::kCorner:
+      return mesh.corners.empty() ? 3 * triangle + k : mesh.corners[3 * triangle + k];
+    case Domain::kFace:
+      return mesh.faces.empty() ? triangle : mesh.faces[triangle];
+    case Domain::kMesh:
+      return 0;
   }
   return 0;
 }

@@ -17,10 +17,10 @@ struct AttributeSlot {
 };
 
 struct AttributeTables {
-  std::vector<std::string> names;      // by number
-  std::vector<AttributeSlot> slots;    // names.size() for each distinct mesh
-  std::vector<uint32_t> first;         // by instance: its mesh's first slot
-  uint32_t generated = kNone;          // number of the attribute "generated", when a program wants it
+  std::vector<std::string> names;    // by number
+  std::vector<AttributeSlot> slots;  // names.size() for each distinct mesh
+  std::vector<uint32_t> first;       // by instance: its mesh's first slot
+  uint32_t generated = kNone;        // number of the attribute "generated", when a program wants it
 
   uint32_t number(const std::string& name);
   void resolve(const Scene&);

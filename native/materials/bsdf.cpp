@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Evaluation, sampling and densities of a Surface with any lobes. One lobe is chosen by its sampling weight; the density
-// is the mixture's, so that next-event light and sampled directions agree. Microfacets: Walter et al. 2007, Heitz 2014;
-// diffuse with roughness: Portsmouth, Kutz and Hill 2024 (energy-preserving Oren–Nayar); Burley 2015.
+// Evaluation, sampling and densities of a Surface with any lobes. One lobe is chosen by its sampling weight; the
+// density is the mixture's, so that next-event light and sampled directions agree. Microfacets: Walter et al. 2007,
+// Heitz 2014; diffuse with roughness: Portsmouth, Kutz and Hill 2024 (energy-preserving Oren–Nayar); Burley 2015.
 #include "materials/albedo_tables.h"
 #include "materials/microfacet.h"
 #include "materials/sheen.h"
@@ -51,9 +51,10 @@ Rgb oren_nayar(const Lobe& lobe, const Vec3& o, const Vec3& i, float cos_o, floa
   Rgb value(scale + b * t);
   if (!old) {
     const float mean_e = a * kPi + (2.0f * kPi - 5.6f) / 3.0f * b;
-    const float missing = (1.0f - (a * kPi + b * oren_nayar_integral(cos_o))) *
-                          (1.0f - (a * kPi + b * oren_nayar_integral(cos_i)));
-    // Blender takes the albedo squared here, on top of the weight: darker colours stay a little darker than the paper's.
+    const float missing =
+        (1.0f - (a * kPi + b * oren_nayar_integral(cos_o))) * (1.0f - (a * kPi + b * oren_nayar_integral(cos_i)));
+    // Blender takes the albedo squared here, on top of the weight: darker colours stay a little darker than the
+    // paper's.
     const Rgb bounced = lobe.f0 * lobe.f0 * (mean_e / (1.0f - mean_e)) / (Rgb(1.0f) - lobe.f0 * (1.0f - mean_e));
     value += bounced * (std::fmax(missing, 0.0f) * kInvPi);
   }
@@ -73,7 +74,8 @@ float masking(const Lobe& lobe, const Vec3& o, const Vec3& i, float lambda_o) {
   }
   const float lambda_i = is_beckmann(lobe.distribution) ? beckmann_lambda(i, lobe.alpha_x, lobe.alpha_y)
                                                         : ggx_lambda(i, lobe.alpha_x, lobe.alpha_y);
-  if (lobe.distribution == Distribution::kGgxSeparable || lobe.distribution == Distribution::kBeckmannSeparable) return 1.0f / ((1.0f + lambda_o) * (1.0f + lambda_i));
+  if (lobe.distribution == Distribution::kGgxSeparable || lobe.distribution == Distribution::kBeckmannSeparable)
+    return 1.0f / ((1.0f + lambda_o) * (1.0f + lambda_i));
   return 1.0f / (1.0f + lambda_o + lambda_i);
 }
 
@@ -109,7 +111,8 @@ LobeValue microfacet_value(const Lobe& lobe, const Vec3& outgoing, const Vec3& i
   const float oh = glm::dot(o, h), ih = glm::dot(i, h);
   if (oh <= 0.0f || (transmitted && ih >= 0.0f)) return result;
   const bool beckmann = is_beckmann(lobe.distribution), gtr1 = lobe.distribution == Distribution::kGtr1;
-  const float lambda_o = beckmann ? beckmann_lambda(o, lobe.alpha_x, lobe.alpha_y) : ggx_lambda(o, lobe.alpha_x, lobe.alpha_y);
+  const float lambda_o =
+      beckmann ? beckmann_lambda(o, lobe.alpha_x, lobe.alpha_y) : ggx_lambda(o, lobe.alpha_x, lobe.alpha_y);
   const float d = gtr1       ? gtr1_distribution(h.z, lobe.alpha_x)
                   : beckmann ? beckmann_distribution(h, lobe.alpha_x, lobe.alpha_y)
                              : ggx_distribution(h, lobe.alpha_x, lobe.alpha_y);
@@ -166,18 +169,24 @@ LobeValue lobe_value(const Lobe& lobe, const Vec3& face, const Vec3& o, const Ve
       result.value = Rgb(result.density);
       return result;
     }
-    default: return microfacet_value(lobe, o, i, transmitted);
+    default:
+      return microfacet_value(lobe, o, i, transmitted);
   }
 }
 
 LobeClass pass_of(const Lobe& lobe, bool transmitted) {
-  return lobe.kind == LobeKind::kMicrofacetGlass && !lobe.one_pass ? (transmitted ? LobeClass::kTransmission : LobeClass::kGlossy) : lobe.pass;
+  return lobe.kind == LobeKind::kMicrofacetGlass && !lobe.one_pass
+             ? (transmitted ? LobeClass::kTransmission : LobeClass::kGlossy)
+             : lobe.pass;
 }
 
 void add(BsdfValue& total, LobeClass pass, const Rgb& value) {
-  if (pass == LobeClass::kDiffuse) total.diffuse += value;
-  else if (pass == LobeClass::kGlossy) total.glossy += value;
-  else total.transmission += value;
+  if (pass == LobeClass::kDiffuse)
+    total.diffuse += value;
+  else if (pass == LobeClass::kGlossy)
+    total.glossy += value;
+  else
+    total.transmission += value;
 }
 
 /// What sampling one lobe gave: direction, and for a delta the weight (Fresnel over the chance of the choice).
@@ -253,7 +262,8 @@ Choice sample_lobe(const Lobe& lobe, const Vec3& outgoing, float u_lobe, const V
       choice.direction = Frame(lobe.normal).to_world(cosine_sample(u));
       choice.valid = true;
       return choice;
-    default: return sample_microfacet(lobe, outgoing, u_lobe, u);
+    default:
+      return sample_microfacet(lobe, outgoing, u_lobe, u);
   }
 }
 
@@ -305,7 +315,8 @@ BsdfSample sample<false>(const Surface& surface, const Vec3& face, const Vec3& o
     result.valid = result.value.density > 0.0f;
     return result;
   }
-  if (lobe.kind >= LobeKind::kMicrofacetReflection) result.roughness = std::sqrt(std::sqrt(lobe.alpha_x * lobe.alpha_y));
+  if (lobe.kind >= LobeKind::kMicrofacetReflection)
+    result.roughness = std::sqrt(std::sqrt(lobe.alpha_x * lobe.alpha_y));
   result.value = evaluate<false>(surface, face, outgoing, choice.direction);
   result.valid = result.value.density > 0.0f;
   return result;
@@ -316,7 +327,8 @@ namespace {
 /// The Fresnel term averaged over the microfacets that are seen, as Blender's colour passes have it.
 Rgb mean_fresnel(const Lobe& lobe, float cosine) {
   if (lobe.fresnel == Fresnel::kNone) return Rgb(1.0f);
-  if (lobe.kind == LobeKind::kMicrofacetReflection && lobe.distribution == Distribution::kGgxSeparable) return Rgb(1.0f);
+  if (lobe.kind == LobeKind::kMicrofacetReflection && lobe.distribution == Distribution::kGgxSeparable)
+    return Rgb(1.0f);
   if (lobe.fresnel == Fresnel::kConductor || lobe.distribution != Distribution::kGgx) return fresnel(lobe, cosine);
   const float roughness = std::sqrt(std::sqrt(lobe.alpha_x * lobe.alpha_y));
   if (lobe.fresnel == Fresnel::kF82) return lerp(lobe.f0, Rgb(1.0f), schlick_share(cosine, roughness, 1.5f));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Lobes of the single shader nodes, as Blender's users know them: roughness is squared to alpha, the index of refraction turns
-// over at a back face, glossy and refracting lobes are left out where the path's caustics are off.
+// Lobes of the single shader nodes, as Blender's users know them: roughness is squared to alpha, the index of
+// refraction turns over at a back face, glossy and refracting lobes are left out where the path's caustics are off.
 #include "materials/closures.h"
 
 #include "materials/albedo_tables.h"
@@ -16,8 +16,8 @@ constexpr float kMostWeight = 1e10f;  // above, products of lobes would overflow
 /// Nothing that is no number, or so large that it soon would be none.
 bool usable(const Lobe& lobe) {
   const float sum = lobe.weight.x + lobe.weight.y + lobe.weight.z;
-  const float shape = lobe.alpha_x + lobe.alpha_y + lobe.ior + lobe.f0.x + lobe.f0.y + lobe.f0.z + lobe.f90.x + lobe.f90.y +
-                      lobe.f90.z + lobe.sampling_weight + lobe.normal.x + lobe.tangent.x;
+  const float shape = lobe.alpha_x + lobe.alpha_y + lobe.ior + lobe.f0.x + lobe.f0.y + lobe.f0.z + lobe.f90.x +
+                      lobe.f90.y + lobe.f90.z + lobe.sampling_weight + lobe.normal.x + lobe.tangent.x;
   return max_component(lobe.weight) > kLeastWeight && sum < kMostWeight && std::fabs(shape) < kMostWeight &&
          std::isfinite(lobe.energy);
 }
@@ -83,7 +83,8 @@ void compensate(Lobe& lobe, const Vec3& outgoing, const Rgb& mean_fresnel) {
   lobe.weight *= Rgb(1.0f) + bounced * ((1.0f - e) / e);
 }
 
-void set_anisotropy(Lobe& lobe, float roughness, float anisotropy, float rotation, const Vec3& tangent, bool principled) {
+void set_anisotropy(Lobe& lobe, float roughness, float anisotropy, float rotation, const Vec3& tangent,
+                    bool principled) {
   const float alpha = sqr(saturate(roughness));
   lobe.alpha_x = lobe.alpha_y = alpha;
   if (principled) {
@@ -94,8 +95,10 @@ void set_anisotropy(Lobe& lobe, float roughness, float anisotropy, float rotatio
   } else {
     anisotropy = std::fmin(std::fmax(anisotropy, -0.99f), 0.99f);
     if (std::fabs(anisotropy) < 1e-4f) return;
-    if (anisotropy < 0.0f) lobe.alpha_x = alpha / (1.0f + anisotropy), lobe.alpha_y = alpha * (1.0f + anisotropy);
-    else lobe.alpha_x = alpha * (1.0f - anisotropy), lobe.alpha_y = alpha / (1.0f - anisotropy);
+    if (anisotropy < 0.0f)
+      lobe.alpha_x = alpha / (1.0f + anisotropy), lobe.alpha_y = alpha * (1.0f + anisotropy);
+    else
+      lobe.alpha_x = alpha * (1.0f - anisotropy), lobe.alpha_y = alpha / (1.0f - anisotropy);
   }
   lobe.alpha_x = std::fmin(lobe.alpha_x, 1.0f), lobe.alpha_y = std::fmin(lobe.alpha_y, 1.0f);
   lobe.tangent = tangent;
@@ -134,8 +137,10 @@ void add_diffuse(const Operands& in, const Common& c, LobeKind kind) {
 }
 
 void set_distribution(Lobe& lobe, uint32_t which, uint32_t version) {
-  if (which == 3) lobe.distribution = version == 1 ? Distribution::kBeckmannSeparable : Distribution::kBeckmann;
-  else if (version == 1 && which != 1) lobe.distribution = Distribution::kGgxSeparable;
+  if (which == 3)
+    lobe.distribution = version == 1 ? Distribution::kBeckmannSeparable : Distribution::kBeckmann;
+  else if (version == 1 && which != 1)
+    lobe.distribution = Distribution::kGgxSeparable;
 }
 
 /// weight, colour, normal, roughness, anisotropy, rotation; distribution, version
@@ -235,8 +240,10 @@ void add_closure(Op op, const Operands& in, const HitContext& hit, Surface& surf
   if (!(weight > kLeastWeight && weight < kMostWeight)) return;
   const SurfacePoint& point = *hit.points[0];
   if (op == Op::kPrincipled) {
-    if (in.u(kParamVersion) == 1) add_principled_v1(in, hit, surface);
-    else add_principled(in, hit, surface);
+    if (in.u(kParamVersion) == 1)
+      add_principled_v1(in, hit, surface);
+    else
+      add_principled(in, hit, surface);
     return;
   }
   if (op == Op::kHoldout) {
@@ -247,13 +254,20 @@ void add_closure(Op op, const Operands& in, const HitContext& hit, Surface& surf
   if (!is_finite(color)) return;
   const Common common{weight, color, point, hit, surface};
   switch (op) {
-    case Op::kDiffuse: return add_diffuse(in, common, LobeKind::kLambert);
-    case Op::kTranslucent: return add_diffuse(in, common, LobeKind::kTranslucent);
-    case Op::kGlossy: return add_glossy(in, common);
-    case Op::kGlass: return add_glass(in, common, false);
-    case Op::kRefraction: return add_glass(in, common, true);
-    case Op::kMetallic: return add_metallic(in, common);
-    case Op::kSheenLobe: return add_sheen(in, common);
+    case Op::kDiffuse:
+      return add_diffuse(in, common, LobeKind::kLambert);
+    case Op::kTranslucent:
+      return add_diffuse(in, common, LobeKind::kTranslucent);
+    case Op::kGlossy:
+      return add_glossy(in, common);
+    case Op::kGlass:
+      return add_glass(in, common, false);
+    case Op::kRefraction:
+      return add_glass(in, common, true);
+    case Op::kMetallic:
+      return add_metallic(in, common);
+    case Op::kSheenLobe:
+      return add_sheen(in, common);
     case Op::kTransparent:
       if (max_component(color) * weight < kMostWeight) surface.transparency += color * weight;
       return;
@@ -263,7 +277,8 @@ void add_closure(Op op, const Operands& in, const HitContext& hit, Surface& surf
       if (strength > 0.0f && is_finite(light)) surface.emission += light;
       return;
     }
-    default: return;
+    default:
+      return;
   }
 }
 

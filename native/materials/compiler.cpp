@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The order of nodes, folding, liveness and registers. Nothing recurses, so that a chain of ten thousand nodes compiles as
-// a short one does.
+// The order of nodes, folding, liveness and registers. Nothing recurses, so that a chain of ten thousand nodes compiles
+// as a short one does.
 #include "materials/compiler.h"
 
 #include <algorithm>
@@ -155,8 +155,10 @@ std::pair<Operand, Operand> Emitter::emit2(Op op, std::vector<Operand> inputs, s
   Instruction instruction{op, 0, 1, kNoOperand, kNoOperand, kNoOperand, 0};
   uint16_t* fixed[3] = {&instruction.a, &instruction.b, &instruction.c};
   for (size_t k = 0; k < draft.inputs.size(); ++k) {
-    if (k < 3) *fixed[k] = uint16_t(number(draft.inputs[k]));
-    else one.pool.push_back(number(draft.inputs[k]));
+    if (k < 3)
+      *fixed[k] = uint16_t(number(draft.inputs[k]));
+    else
+      one.pool.push_back(number(draft.inputs[k]));
   }
   one.pool.insert(one.pool.end(), draft.params.begin(), draft.params.end());
   one.code.push_back(instruction);
@@ -230,7 +232,8 @@ void Emitter::write_values() {
     warn("node \"" + node.name + "\" of unknown type \"" + node.type + "\" is passed through");
     Operand stand_in{};
     for (const auto& [name, value] : node.inputs) {  // the first linked or coloured input stands for the outputs
-      if (stand_in.none() || (std::holds_alternative<Link>(value) && !linked_input(name.c_str(), Type::kColor).none())) {
+      if (stand_in.none() ||
+          (std::holds_alternative<Link>(value) && !linked_input(name.c_str(), Type::kColor).none())) {
         stand_in = input(name.c_str(), Type::kColor, 0.8f);
       }
     }
@@ -268,10 +271,13 @@ void Emitter::write_closures() {
       give("shader", weight), give("shader_001", weight);
     } else if (is_closure(type)) {
       write_closure(weight);
-    } else if (outputs_.count(key(current, 0)) && !outputs_[key(current, 0)].empty() && kind != ProgramKind::kTransparency) {
-      Operand color = convert(outputs_[key(current, 0)].front().value, outputs_[key(current, 0)].front().type, Type::kColor);
+    } else if (outputs_.count(key(current, 0)) && !outputs_[key(current, 0)].empty() &&
+               kind != ProgramKind::kTransparency) {
+      Operand color =
+          convert(outputs_[key(current, 0)].front().value, outputs_[key(current, 0)].front().type, Type::kColor);
       for (const Output& output : outputs_[key(current, 0)]) {
-        if (current == graph.surface.node && output.name == graph.surface.output) color = convert(output.value, output.type, Type::kColor);
+        if (current == graph.surface.node && output.name == graph.surface.output)
+          color = convert(output.value, output.type, Type::kColor);
       }
       closure(Op::kEmission, {weight, color, constant(1.0f)});
       closure_effects |= kEmissiveMesh;
@@ -332,13 +338,15 @@ Program Emitter::lower() {
   for (size_t k = 0; k < drafts.size() && !too_large; ++k) {
     if (!keep[k]) continue;
     const Draft& draft = drafts[k];
-    Instruction instruction{draft.op, kNoOperand, kNoOperand, kNoOperand, kNoOperand, kNoOperand,
-                            uint32_t(program.pool.size())};
+    Instruction instruction{
+        draft.op, kNoOperand, kNoOperand, kNoOperand, kNoOperand, kNoOperand, uint32_t(program.pool.size())};
     uint16_t* fixed[3] = {&instruction.a, &instruction.b, &instruction.c};
     for (size_t i = 0; i < draft.inputs.size(); ++i) {
       const uint32_t operand = number(draft.inputs[i]);
-      if (i < 3) *fixed[i] = uint16_t(operand);
-      else program.pool.push_back(operand);
+      if (i < 3)
+        *fixed[i] = uint16_t(operand);
+      else
+        program.pool.push_back(operand);
     }
     program.pool.insert(program.pool.end(), draft.params.begin(), draft.params.end());
     // Outputs are taken before the inputs' places are free: an instruction may write one before it has read all.
@@ -346,7 +354,8 @@ Program Emitter::lower() {
     instruction.out2 = take(draft.out[1]);
     for (const uint32_t r : ends[k]) free.push_back(place[r]);
     if (reads_hit(draft.op)) program.effects |= kTextures;
-    program.reads_uv |= reads_hit(draft.op) || draft.op == Op::kGlossy || draft.op == Op::kMetallic || draft.op == Op::kPrincipled;
+    program.reads_uv |=
+        reads_hit(draft.op) || draft.op == Op::kGlossy || draft.op == Op::kMetallic || draft.op == Op::kPrincipled;
     if (draft.op >= Op::kFirstClosure) program.empty = false;
     program.code.push_back(instruction);
   }
@@ -373,9 +382,16 @@ Program compile(const Graph& graph, ProgramKind kind, const CompileHost& host) {
   for (const Instruction& instruction : program.code) {
     const uint32_t* pool = program.pool.data() + instruction.data;
     switch (instruction.op) {  // closures that depend on nothing but the normal
-      case Op::kDiffuse: case Op::kTranslucent: folded &= pool[2] == kNoOperand; break;
-      case Op::kTransparent: case Op::kEmission: case Op::kHoldout: break;
-      default: folded = false;
+      case Op::kDiffuse:
+      case Op::kTranslucent:
+        folded &= pool[2] == kNoOperand;
+        break;
+      case Op::kTransparent:
+      case Op::kEmission:
+      case Op::kHoldout:
+        break;
+      default:
+        folded = false;
     }
   }
   folded &= program.registers == 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a node graph to a program: nodes in dependency order, what needs no hit computed at once, closures collected with
-// their weights from the root down, what nobody reads dropped, registers shared.
+// From a node graph to a program: nodes in dependency order, what needs no hit computed at once, closures collected
+// with their weights from the root down, what nobody reads dropped, registers shared.
 #pragma once
 
 #include <functional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What node handlers use to write a program: typed inputs with Blender's implicit conversions, parameters with defaults,
-// instructions that are computed at once when nothing of the hit is read.
+// What node handlers use to write a program: typed inputs with Blender's implicit conversions, parameters with
+// defaults, instructions that are computed at once when nothing of the hit is read.
 #pragma once
 
 #include <unordered_map>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Instructions that read the hit: coordinates, geometry, attributes, the path, and normals from maps and bumps (Blinn 1978;
-// Mikkelsen 2010, the surface gradient).
+// Instructions that read the hit: coordinates, geometry, attributes, the path, and normals from maps and bumps (Blinn
+// 1978; Mikkelsen 2010, the surface gradient).
 #include <algorithm>
 
 #include "materials/attributes.h"
@@ -42,8 +42,11 @@ Vec3 generated(const HitContext& hit, const SurfacePoint& p) {
       return Vec3(interpolate(*slot, *record->mesh, p));
     }
   }
-  const Vec3 q = record->to_object.point(p.position), low = record->mesh->bounds.lower, size = record->mesh->bounds.size();
-  const auto axis = [](float v, float base, float extent) { return extent > 0.0f ? (v - base) / extent : v - base + 0.5f; };
+  const Vec3 q = record->to_object.point(p.position), low = record->mesh->bounds.lower,
+             size = record->mesh->bounds.size();
+  const auto axis = [](float v, float base, float extent) {
+    return extent > 0.0f ? (v - base) / extent : v - base + 0.5f;
+  };
   return {axis(q.x, low.x, size.x), axis(q.y, low.y, size.y), axis(q.z, low.z, size.z)};
 }
 
@@ -52,7 +55,9 @@ Vec3 camera_position(const HitContext& hit, const Vec3& relative, bool direction
   if (!hit.scene) return relative;
   const DMat4& m = hit.scene->camera().transform;
   const DVec3 p = DVec3(relative) + (direction ? DVec3(0.0) : hit.scene->origin() - DVec3(m[3]));
-  const auto along = [&](int k) { return glm::dot(p, DVec3(m[k])) / std::max(glm::dot(DVec3(m[k]), DVec3(m[k])), 1e-30); };
+  const auto along = [&](int k) {
+    return glm::dot(p, DVec3(m[k])) / std::max(glm::dot(DVec3(m[k]), DVec3(m[k])), 1e-30);
+  };
   return {float(along(0)), float(along(1)), float(-along(2))};
 }
 
@@ -77,17 +82,24 @@ enum Coordinate : uint32_t { kGenerated, kNormal, kObject, kCamera, kWindow, kRe
 Vec3 tex_coord(const Operands& in, const HitContext& hit) {  // coordinate, offset, has matrix, 12 floats
   const SurfacePoint& p = *hit.points[in.u(1)];
   switch (in.u(0)) {
-    case kGenerated: return generated(hit, p);
-    case kNormal: return object_normal(hit, p, p.normal);
+    case kGenerated:
+      return generated(hit, p);
+    case kNormal:
+      return object_normal(hit, p, p.normal);
     case kObject: {
       if (!in.u(2)) return object_position(hit, p);
       const Vec3 w = world_position(hit, p);
-      const auto row = [&](int k) { return in.p(3 + k * 4) * w.x + in.p(4 + k * 4) * w.y + in.p(5 + k * 4) * w.z + in.p(6 + k * 4); };
+      const auto row = [&](int k) {
+        return in.p(3 + k * 4) * w.x + in.p(4 + k * 4) * w.y + in.p(5 + k * 4) * w.z + in.p(6 + k * 4);
+      };
       return {row(0), row(1), row(2)};
     }
-    case kCamera: return camera_position(hit, p.position, hit.background);
-    case kWindow: return window_position(hit, p);
-    default: return hit.background ? p.position : p.normal * (2.0f * glm::dot(p.normal, p.outgoing)) - p.outgoing;
+    case kCamera:
+      return camera_position(hit, p.position, hit.background);
+    case kWindow:
+      return window_position(hit, p);
+    default:
+      return hit.background ? p.position : p.normal * (2.0f * glm::dot(p.normal, p.outgoing)) - p.outgoing;
   }
 }
 
@@ -104,14 +116,22 @@ Vec3 attribute(const Operands& in, const HitContext& hit, Vec3* alpha) {  // num
 Vec3 geometry(const Operands& in, const HitContext& hit) {  // which, offset
   const SurfacePoint& p = *hit.points[in.u(1)];
   switch (in.u(0)) {
-    case 0: return world_position(hit, p);
-    case 1: return p.normal;
-    case 2: return default_tangent(hit);
-    case 3: return p.face_normal;
-    case 4: return p.outgoing;
-    case 5: return {p.u, p.v, 0.0f};
-    case 6: return Vec3(p.backfacing ? 1.0f : 0.0f);
-    default: return Vec3(0.5f);
+    case 0:
+      return world_position(hit, p);
+    case 1:
+      return p.normal;
+    case 2:
+      return default_tangent(hit);
+    case 3:
+      return p.face_normal;
+    case 4:
+      return p.outgoing;
+    case 5:
+      return {p.u, p.v, 0.0f};
+    case 6:
+      return Vec3(p.backfacing ? 1.0f : 0.0f);
+    default:
+      return Vec3(0.5f);
   }
 }
 
@@ -119,36 +139,55 @@ Vec3 light_path(uint32_t which, const PathContext* path) {
   if (!path) return Vec3(which == 0 ? 1.0f : 0.0f);
   const auto bit = [&](uint32_t kind) { return Vec3((path->kind & kind) ? 1.0f : 0.0f); };
   switch (which) {
-    case 0: return bit(PathContext::kCamera);
-    case 1: return bit(PathContext::kShadow);
-    case 2: return bit(PathContext::kDiffuse);
-    case 3: return bit(PathContext::kGlossy);
-    case 4: return bit(PathContext::kSingular);
-    case 5: return bit(PathContext::kReflection);
-    case 6: return bit(PathContext::kTransmission);
-    case 7: return Vec3(path->ray_length);
-    case 8: return Vec3(path->depth);
-    case 9: return Vec3(path->diffuse_depth);
-    case 10: return Vec3(path->glossy_depth);
-    case 11: return Vec3(path->transparent_depth);
-    default: return Vec3(path->transmission_depth);
+    case 0:
+      return bit(PathContext::kCamera);
+    case 1:
+      return bit(PathContext::kShadow);
+    case 2:
+      return bit(PathContext::kDiffuse);
+    case 3:
+      return bit(PathContext::kGlossy);
+    case 4:
+      return bit(PathContext::kSingular);
+    case 5:
+      return bit(PathContext::kReflection);
+    case 6:
+      return bit(PathContext::kTransmission);
+    case 7:
+      return Vec3(path->ray_length);
+    case 8:
+      return Vec3(path->depth);
+    case 9:
+      return Vec3(path->diffuse_depth);
+    case 10:
+      return Vec3(path->glossy_depth);
+    case 11:
+      return Vec3(path->transparent_depth);
+    default:
+      return Vec3(path->transmission_depth);
   }
 }
 
 Vec3 object_info(uint32_t which, const HitContext& hit) {
   const InstanceRecord* record = instance_of(hit, *hit.points[0]);
   switch (which) {
-    case 0: return record ? record->to_world.p + Vec3(hit.scene->origin()) : Vec3(0.0f);
-    case 1: return record ? Vec3(record->color) : Vec3(1.0f);
-    case 2: return Vec3(record ? record->color.w : 1.0f);
-    case 3: return Vec3(record ? float(record->object_index) : 0.0f);
-    case 4: return Vec3(float(hit.material_index));
-    default: return Vec3(record ? record->random : 0.0f);
+    case 0:
+      return record ? record->to_world.p + Vec3(hit.scene->origin()) : Vec3(0.0f);
+    case 1:
+      return record ? Vec3(record->color) : Vec3(1.0f);
+    case 2:
+      return Vec3(record ? record->color.w : 1.0f);
+    case 3:
+      return Vec3(record ? float(record->object_index) : 0.0f);
+    case 4:
+      return Vec3(float(hit.material_index));
+    default:
+      return Vec3(record ? record->random : 0.0f);
   }
 }
 
-/// Tangent of a UV map at the hit's triangle, at right angles to the normal; sign: handedness. (MikkTSpace averages these
-/// over corners; here each triangle has its own.)
+/// Tangent of a UV map at the hit's triangle, at right angles to the normal; sign: handedness. (MikkTSpace averages
+/// these over corners; here each triangle has its own.)
 bool uv_tangent(const HitContext& hit, uint32_t number, const Vec3& normal, Vec3& tangent, float& sign) {
   const SurfacePoint& p = *hit.points[0];
   const InstanceRecord* record = instance_of(hit, p);
@@ -201,7 +240,8 @@ Vec3 normal_map(const Instruction& ins, const Operands& in, const HitContext& hi
   return unit_or(p.normal + (n - p.normal) * strength, p.normal);
 }
 
-Vec3 bump(const Instruction& ins, const Operands& in, const HitContext& hit) {  // h0, h1, h2; strength, distance, normal; sign
+Vec3 bump(const Instruction& ins, const Operands& in,
+          const HitContext& hit) {  // h0, h1, h2; strength, distance, normal; sign
   const SurfacePoint& p = *hit.points[0];
   if (!hit.points[1]) return p.normal;
   const Vec3 n = in.given(2) ? unit_or(in.v(2), p.normal) : p.normal;
@@ -214,7 +254,7 @@ Vec3 bump(const Instruction& ins, const Operands& in, const HitContext& hit) {  
 }
 
 Vec3 vector_transform(const Operands& in, const HitContext& hit, Vec3 v) {  // kind, from, to
-  const uint32_t kind = in.u(0), from = in.u(1), to = in.u(2);  // 0 world, 1 object, 2 camera
+  const uint32_t kind = in.u(0), from = in.u(1), to = in.u(2);              // 0 world, 1 object, 2 camera
   const InstanceRecord* record = instance_of(hit, *hit.points[0]);
   const bool point = kind == 1, normal = kind == 2;
   const Vec3 origin = hit.scene ? Vec3(hit.scene->origin()) : Vec3(0.0f);
@@ -262,19 +302,27 @@ Vec3 default_tangent(const HitContext& hit) {
 Vec3 read_hit(const Instruction& ins, const Operands& in, const HitContext& hit, Vec3* second) {
   const SurfacePoint& p = *hit.points[0];
   switch (ins.op) {
-    case Op::kTexCoord: return tex_coord(in, hit);
-    case Op::kUv: return Vec3(hit.points[in.u(0)]->uv, 0.0f);
-    case Op::kAttribute: return attribute(in, hit, second);
-    case Op::kGeometry: return geometry(in, hit);
-    case Op::kLightPath: return light_path(in.u(0), hit.path);
-    case Op::kObjectInfo: return object_info(in.u(0), hit);
+    case Op::kTexCoord:
+      return tex_coord(in, hit);
+    case Op::kUv:
+      return Vec3(hit.points[in.u(0)]->uv, 0.0f);
+    case Op::kAttribute:
+      return attribute(in, hit, second);
+    case Op::kGeometry:
+      return geometry(in, hit);
+    case Op::kLightPath:
+      return light_path(in.u(0), hit.path);
+    case Op::kObjectInfo:
+      return object_info(in.u(0), hit);
     case Op::kCamera: {
       const Vec3 q = camera_position(hit, p.position, hit.background);
       *second = Vec3(in.u(0) ? glm::length(q) : std::fabs(q.z));
       return unit_or(q, Vec3(0, 0, 1));
     }
-    case Op::kNormalMap: return normal_map(ins, in, hit);
-    case Op::kBump: return bump(ins, in, hit);
+    case Op::kNormalMap:
+      return normal_map(ins, in, hit);
+    case Op::kBump:
+      return bump(ins, in, hit);
     case Op::kFresnel: {
       const float eta = std::max(in.at(ins.a).x, 1e-5f);
       const Vec3 n = ins.b == kNoOperand ? p.normal : unit_or(in.at(ins.b), p.normal);
@@ -288,7 +336,8 @@ Vec3 read_hit(const Instruction& ins, const Operands& in, const HitContext& hit,
       *second = Vec3(1.0f - (mix == 0.5f ? cosine : std::pow(cosine, power)));
       return Vec3(fresnel_dielectric(cosine, p.backfacing ? eta : 1.0f / eta));
     }
-    case Op::kVectorTransform: return vector_transform(in, hit, in.at(ins.a));
+    case Op::kVectorTransform:
+      return vector_transform(in, hit, in.at(ins.a));
     case Op::kTangent: {
       if (in.u(0) == 0) {  // of a UV map
         Vec3 t;
@@ -301,8 +350,10 @@ Vec3 read_hit(const Instruction& ins, const Operands& in, const HitContext& hit,
       if (const InstanceRecord* record = instance_of(hit, p)) t = record->to_world.vector(t);
       return unit_or(glm::cross(p.normal, unit_or(glm::cross(t, p.normal), Vec3(0.0f))), t);
     }
-    case Op::kWireframe: return wireframe(ins, hit, in);
-    default: return Vec3(0.0f);
+    case Op::kWireframe:
+      return wireframe(ins, hit, in);
+    default:
+      return Vec3(0.0f);
   }
 }
 

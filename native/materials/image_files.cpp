@@ -77,20 +77,26 @@ struct TemporaryFile {
 
 template <class T>
 T scaled(T value, T alpha) {
-  if constexpr (sizeof(T) == 1) return T((unsigned(value) * unsigned(alpha)) / 255u);
-  else return value * alpha;
+  if constexpr (sizeof(T) == 1)
+    return T((unsigned(value) * unsigned(alpha)) / 255u);
+  else
+    return value * alpha;
 }
 
 template <class T>
 T opaque() {
-  if constexpr (sizeof(T) == 1) return T(255);
-  else return T(1);
+  if constexpr (sizeof(T) == 1)
+    return T(255);
+  else
+    return T(1);
 }
 
 template <class T>
 T cleaned(T v) {
-  if constexpr (sizeof(T) == 4) return std::isfinite(v) ? v : T(0);
-  else return v;
+  if constexpr (sizeof(T) == 4)
+    return std::isfinite(v) ? v : T(0);
+  else
+    return v;
 }
 
 /// Pixels with 1 to 4 channels, rows in either order, to 1 or 4 channels with associated alpha.
@@ -143,7 +149,9 @@ void read_pixels(OIIO::ImageInput& input, const Image& image, Texture& t, std::s
     t.channels = channels == 1 ? 1 : 4;
     t.data.resize(size_t(t.width) * size_t(t.height) * t.channels * 2);
     uint16_t* out = reinterpret_cast<uint16_t*>(t.data.data());
-    const auto finite = [](uint16_t h) { return (h & 0x7c00u) == 0x7c00u ? uint16_t(h & 0x3ffu ? 0 : (h & 0x8000u) | 0x7bffu) : h; };
+    const auto finite = [](uint16_t h) {
+      return (h & 0x7c00u) == 0x7c00u ? uint16_t(h & 0x3ffu ? 0 : (h & 0x8000u) | 0x7bffu) : h;
+    };
     for (int y = 0; read && y < t.height; ++y) {
       const uint16_t* in = pixels.data() + size_t(t.height - 1 - y) * size_t(t.width) * size_t(channels);
       for (int x = 0; x < t.width; ++x, in += channels) {
@@ -178,10 +186,13 @@ Texture read_texture(const Image& image, const ImageSource& source, std::string&
       return t;
     }
     t.width = int(source.width), t.height = int(source.height);
-    const bool multiply = image.alpha == "straight" && !is_data(image.colorspace) && (source.channels == 2 || source.channels == 4);
+    const bool multiply =
+        image.alpha == "straight" && !is_data(image.colorspace) && (source.channels == 2 || source.channels == 4);
     t.kind = bytes ? Texture::Kind::kByte : Texture::Kind::kFloat;
-    if (bytes) arrange(t, source.byte_pixels.data(), int(source.channels), false, image.alpha, multiply);
-    else arrange(t, source.pixels.data(), int(source.channels), false, image.alpha, multiply);
+    if (bytes)
+      arrange(t, source.byte_pixels.data(), int(source.channels), false, image.alpha, multiply);
+    else
+      arrange(t, source.pixels.data(), int(source.channels), false, image.alpha, multiply);
   } else {
     OIIO::ImageSpec config;
     config.attribute("oiio:UnassociatedAlpha", 1);
@@ -192,7 +203,8 @@ Texture read_texture(const Image& image, const ImageSource& source, std::string&
     std::unique_ptr<OIIO::Filesystem::IOMemReader> memory;
     if (!source.encoded.empty()) {
       const std::string name = name_of_bytes(source.encoded);
-      memory = std::make_unique<OIIO::Filesystem::IOMemReader>(const_cast<uint8_t*>(source.encoded.data()), source.encoded.size());
+      memory = std::make_unique<OIIO::Filesystem::IOMemReader>(const_cast<uint8_t*>(source.encoded.data()),
+                                                               source.encoded.size());
       input = OIIO::ImageInput::open(name, &config, memory.get());
       if (!input) {
         file = std::make_unique<TemporaryFile>(source.encoded, name);
@@ -204,7 +216,8 @@ Texture read_texture(const Image& image, const ImageSource& source, std::string&
     if (!input) {
       std::string why = OIIO::geterror();
       std::replace(why.begin(), why.end(), '\n', ' ');
-      error = (source.encoded.empty() ? "cannot read \"" + source.path + "\"" : "its packed data cannot be read") + " (" + why + "); shown magenta";
+      error = (source.encoded.empty() ? "cannot read \"" + source.path + "\"" : "its packed data cannot be read") +
+              " (" + why + "); shown magenta";
       return t;
     }
     read_pixels(*input, image, t, error);
@@ -220,7 +233,8 @@ Texture read_texture(const Image& image, const ImageSource& source, std::string&
   }
   if (space == Space::kUnknown && t.valid()) {
     t.srgb = t.kind == Texture::Kind::kByte;
-    if (error.empty()) error = "colour space \"" + image.colorspace + "\" is unknown; taken as " + (t.srgb ? "sRGB" : "linear");
+    if (error.empty())
+      error = "colour space \"" + image.colorspace + "\" is unknown; taken as " + (t.srgb ? "sRGB" : "linear");
   }
   return t;
 }

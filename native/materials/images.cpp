@@ -59,13 +59,15 @@ int wrap(int k, int size, Extension extension) {
       const int r = k % size;
       return r < 0 ? r + size : r;
     }
-    case Extension::kExtend: return std::clamp(k, 0, size - 1);
+    case Extension::kExtend:
+      return std::clamp(k, 0, size - 1);
     case Extension::kMirror: {
       int r = k % (2 * size);
       if (r < 0) r += 2 * size;
       return r < size ? r : 2 * size - 1 - r;
     }
-    default: return -1;
+    default:
+      return -1;
   }
 }
 
@@ -101,7 +103,8 @@ Vec4 look_up(const Texture& t, float u, float v, Interpolation interpolation, Ex
   if (extension == Extension::kRepeat) u -= std::floor(u), v -= std::floor(v);
   const float x = u * float(t.width), y = v * float(t.height);
   if (interpolation == Interpolation::kClosest) {
-    return texel_or_nothing(t, wrap(int(std::floor(x)), t.width, extension), wrap(int(std::floor(y)), t.height, extension));
+    return texel_or_nothing(t, wrap(int(std::floor(x)), t.width, extension),
+                            wrap(int(std::floor(y)), t.height, extension));
   }
   const float fx = std::floor(x - 0.5f), fy = std::floor(y - 0.5f), tx = x - 0.5f - fx, ty = y - 0.5f - fy;
   const int ix = int(fx), iy = int(fy);
@@ -158,7 +161,8 @@ void Images::load(const Scene& scene, std::vector<std::string>& warnings) {
       continue;
     }
     const Image& image = scene.image(entry.handle);
-    if (!entry.tiles.empty() && entry.sources == image.tiles && entry.colorspace == image.colorspace && entry.alpha == image.alpha) {
+    if (!entry.tiles.empty() && entry.sources == image.tiles && entry.colorspace == image.colorspace &&
+        entry.alpha == image.alpha) {
       continue;
     }
     entry.sources = image.tiles, entry.colorspace = image.colorspace, entry.alpha = image.alpha;
@@ -168,18 +172,21 @@ void Images::load(const Scene& scene, std::vector<std::string>& warnings) {
     }
   }
   parallel_blocks(jobs.size(), 1, [&](size_t begin, size_t end) {
-    for (size_t k = begin; k < end; ++k) *jobs[k].texture = read_texture(*jobs[k].image, *jobs[k].source, jobs[k].error);
+    for (size_t k = begin; k < end; ++k)
+      *jobs[k].texture = read_texture(*jobs[k].image, *jobs[k].source, jobs[k].error);
   });
   for (const Job& job : jobs) {
     if (!job.error.empty()) warnings.push_back("image \"" + job.image->name + "\": " + job.error);
   }
   for (Entry& entry : entries_) {
-    entry.single = entry.tiles.size() == 1 && entry.tiles.begin()->first == 1001 ? &entry.tiles.begin()->second : nullptr;
+    entry.single =
+        entry.tiles.size() == 1 && entry.tiles.begin()->first == 1001 ? &entry.tiles.begin()->second : nullptr;
     entry.missing = entry.tiles.empty();
   }
 }
 
-Vec4 Images::sample(uint32_t number, Vec2 uv, Interpolation interpolation, Extension extension, bool unassociate) const {
+Vec4 Images::sample(uint32_t number, Vec2 uv, Interpolation interpolation, Extension extension,
+                    bool unassociate) const {
   static const Vec4 magenta(1.0f, 0.0f, 1.0f, 1.0f);
   if (number >= entries_.size() || entries_[number].missing) return magenta;
   const Entry& entry = entries_[number];

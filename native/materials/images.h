@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Images in memory as programs read them: read and decoded by OpenImageIO once, looked up directly. (OpenImageIO's texture
-// system was measured too: see docs/architecture.md, "Textures".) Values stay as encoded in the file; an sRGB curve is undone
-// after filtering, as Blender does it.
+// Images in memory as programs read them: read and decoded by OpenImageIO once, looked up directly. (OpenImageIO's
+// texture system was measured too: see docs/architecture.md, "Textures".) Values stay as encoded in the file; an sRGB
+// curve is undone after filtering, as Blender does it.
 #pragma once
 
 #include <map>

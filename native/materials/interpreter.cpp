@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Runs programs: one switch over the instructions. Short operations stand here, long ones in math_ops, hit_ops, textures and
-// closures.
+// Runs programs: one switch over the instructions. Short operations stand here, long ones in math_ops, hit_ops,
+// textures and closures.
 #include <algorithm>
 
 #include "materials/attributes.h"
@@ -29,7 +29,8 @@ Vec4 row(const Operands& in, int start, int n, int width, float position, bool i
 float curve(const Operands& in, int start, int n, int width, int channel, float position, bool extrapolate) {
   const auto at = [&](int k) { return in.p(start + k * width + channel); };
   if (extrapolate && n > 1 && position < 0.0f) return at(0) + (at(0) - at(1)) * -position * float(n - 1);
-  if (extrapolate && n > 1 && position > 1.0f) return at(n - 1) + (at(n - 1) - at(n - 2)) * (position - 1.0f) * float(n - 1);
+  if (extrapolate && n > 1 && position > 1.0f)
+    return at(n - 1) + (at(n - 1) - at(n - 2)) * (position - 1.0f) * float(n - 1);
   const float f = saturate(position) * float(n - 1);
   const int k = std::min(int(f), n - 1);
   const float t = f - float(k);
@@ -80,19 +81,23 @@ Vec3 safe_divide(const Vec3& a, const Vec3& b) {
 
 Vec3 run_mapping(uint32_t kind, const Vec3& v, const Vec3& location, const Vec3& rotation, const Vec3& scale) {
   switch (kind) {
-    case 1: return safe_divide(rotate_euler(v - location, rotation, true), scale);  // texture
-    case 2: return rotate_euler(v * scale, rotation, false);                        // vector
-    case 3: {                                                                       // normal
+    case 1:
+      return safe_divide(rotate_euler(v - location, rotation, true), scale);  // texture
+    case 2:
+      return rotate_euler(v * scale, rotation, false);  // vector
+    case 3: {                                           // normal
       const Vec3 n = rotate_euler(safe_divide(v, scale), rotation, false);
       const float length = glm::length(n);
       return length > 0.0f ? n / length : n;
     }
-    default: return rotate_euler(v * scale, rotation, false) + location;
+    default:
+      return rotate_euler(v * scale, rotation, false) + location;
   }
 }
 
 /// Axis–angle or Euler rotation about a centre.
-Vec3 run_vector_rotate(uint32_t kind, bool invert, const Vec3& v, const Vec3& centre, const Vec3& axis_or_euler, float angle) {
+Vec3 run_vector_rotate(uint32_t kind, bool invert, const Vec3& v, const Vec3& centre, const Vec3& axis_or_euler,
+                       float angle) {
   const Vec3 from = v - centre;
   if (kind == 4) return rotate_euler(from, axis_or_euler, invert) + centre;
   Vec3 axis = kind == 1 ? Vec3(1, 0, 0) : kind == 2 ? Vec3(0, 1, 0) : kind == 3 ? Vec3(0, 0, 1) : axis_or_euler;
@@ -142,24 +147,41 @@ void execute(const Program& program, const HitContext& hit, Vec3* r, Surface* ou
     const Vec3& c = ins.c == kNoOperand ? zero : in.at(ins.c);
     Vec3 result(0.0f), second(0.0f);
     switch (ins.op) {
-      case Op::kLuminance: result = Vec3(luminance(a)); break;
-      case Op::kAverage: result = Vec3((a.x + a.y + a.z) * (1.0f / 3.0f)); break;
-      case Op::kReplicate: result = Vec3(a.x); break;
-      case Op::kOneMinus: result = Vec3(1.0f - a.x); break;
+      case Op::kLuminance:
+        result = Vec3(luminance(a));
+        break;
+      case Op::kAverage:
+        result = Vec3((a.x + a.y + a.z) * (1.0f / 3.0f));
+        break;
+      case Op::kReplicate:
+        result = Vec3(a.x);
+        break;
+      case Op::kOneMinus:
+        result = Vec3(1.0f - a.x);
+        break;
       case Op::kMath: {
         const float v = run_math(in.u(0), a.x, b.x, c.x);
         result = Vec3(in.u(1) ? saturate(v) : v);
         break;
       }
-      case Op::kVectorMath: run_vector_math(in.u(1), a, b, c, in.f(0), result, second.x); second = Vec3(second.x); break;
-      case Op::kMixFloat: result = Vec3(b.x + (c.x - b.x) * a.x); break;
-      case Op::kMixVector: result = b + (c - b) * a; break;
+      case Op::kVectorMath:
+        run_vector_math(in.u(1), a, b, c, in.f(0), result, second.x);
+        second = Vec3(second.x);
+        break;
+      case Op::kMixFloat:
+        result = Vec3(b.x + (c.x - b.x) * a.x);
+        break;
+      case Op::kMixVector:
+        result = b + (c - b) * a;
+        break;
       case Op::kMixColor: {
         result = blend(in.u(0), a.x, b, c);
         if (in.u(1)) result = saturate(result);
         break;
       }
-      case Op::kClamp: result = Vec3(in.u(0) ? clamp_between(a.x, b.x, c.x) : std::fmin(std::fmax(a.x, b.x), c.x)); break;
+      case Op::kClamp:
+        result = Vec3(in.u(0) ? clamp_between(a.x, b.x, c.x) : std::fmin(std::fmax(a.x, b.x), c.x));
+        break;
       case Op::kMapRange: {
         float v = map_range(in.u(3), a.x, b.x, c.x, in.f(0), in.f(1), in.f(2));
         if (in.u(4)) v = clamp_between(v, in.f(0), in.f(1));
@@ -173,31 +195,51 @@ void execute(const Program& program, const HitContext& hit, Vec3* r, Surface* ou
           result[k] = v;
         }
         break;
-      case Op::kSeparate: result = Vec3(to_model(in.u(0), a)[int(in.u(1))]); break;
-      case Op::kCombine: result = from_model(in.u(0), {a.x, b.x, c.x}); break;
+      case Op::kSeparate:
+        result = Vec3(to_model(in.u(0), a)[int(in.u(1))]);
+        break;
+      case Op::kCombine:
+        result = from_model(in.u(0), {a.x, b.x, c.x});
+        break;
       case Op::kRamp: {
         const Vec4 v = row(in, 2, in.i(1), 4, a.x, in.u(0) != 0);
         result = Vec3(v), second = Vec3(v.w);
         break;
       }
-      case Op::kCurves: result = run_curves(in, a.x, b); break;
-      case Op::kHueSaturation: result = hue_saturation(a.x, b.x, c.x, in.f(0), in.v(1)); break;
-      case Op::kGamma: result = {safe_gamma(a.x, b.x), safe_gamma(a.y, b.x), safe_gamma(a.z, b.x)}; break;
-      case Op::kInvert: result = lerp(b, Rgb(1.0f) - b, a.x); break;
+      case Op::kCurves:
+        result = run_curves(in, a.x, b);
+        break;
+      case Op::kHueSaturation:
+        result = hue_saturation(a.x, b.x, c.x, in.f(0), in.v(1));
+        break;
+      case Op::kGamma:
+        result = {safe_gamma(a.x, b.x), safe_gamma(a.y, b.x), safe_gamma(a.z, b.x)};
+        break;
+      case Op::kInvert:
+        result = lerp(b, Rgb(1.0f) - b, a.x);
+        break;
       case Op::kBrightContrast: {
         const float scale = 1.0f + c.x, offset = b.x - c.x * 0.5f;
         result = glm::max(a * scale + offset, Rgb(0.0f));
         break;
       }
-      case Op::kMapping: result = run_mapping(in.u(1), a, b, c, in.v(0)); break;
+      case Op::kMapping:
+        result = run_mapping(in.u(1), a, b, c, in.v(0));
+        break;
       case Op::kMatrix:
         for (int k = 0; k < 3; ++k) {
           result[k] = in.p(4 * k) * a.x + in.p(4 * k + 1) * a.y + in.p(4 * k + 2) * a.z + in.p(4 * k + 3);
         }
         break;
-      case Op::kVectorRotate: result = run_vector_rotate(in.u(1), in.u(2) != 0, a, b, c, in.f(0)); break;
-      case Op::kBlackbody: result = blackbody(a.x); break;
-      case Op::kWavelength: result = wavelength(a.x); break;
+      case Op::kVectorRotate:
+        result = run_vector_rotate(in.u(1), in.u(2) != 0, a, b, c, in.f(0));
+        break;
+      case Op::kBlackbody:
+        result = blackbody(a.x);
+        break;
+      case Op::kWavelength:
+        result = wavelength(a.x);
+        break;
       case Op::kNormalNode: {
         const float la = glm::length(a), lb = glm::length(b);
         result = lb > 0.0f ? b / lb : b;
@@ -210,11 +252,21 @@ void execute(const Program& program, const HitContext& hit, Vec3* r, Surface* ou
         second = Vec3(first ? 1.0f : 0.0f);
         break;
       }
-      case Op::kNoise: case Op::kVoronoi: case Op::kWave: case Op::kGradient: case Op::kMagic: case Op::kBrick:
-      case Op::kWhiteNoise: case Op::kGabor: case Op::kSky: case Op::kImage: case Op::kEnvironment:
+      case Op::kNoise:
+      case Op::kVoronoi:
+      case Op::kWave:
+      case Op::kGradient:
+      case Op::kMagic:
+      case Op::kBrick:
+      case Op::kWhiteNoise:
+      case Op::kGabor:
+      case Op::kSky:
+      case Op::kImage:
+      case Op::kEnvironment:
         result = run_texture(ins, in, hit, &second);
         break;
-      default: result = read_hit(ins, in, hit, &second);
+      default:
+        result = read_hit(ins, in, hit, &second);
     }
     if (ins.out != kNoOperand) r[ins.out] = result;
     if (ins.out2 != kNoOperand) r[ins.out2] = second;

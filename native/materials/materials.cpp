@@ -95,7 +95,8 @@ Compiled Materials::State::compile_material(const Scene& scene, Handle handle, s
   static const Graph grey = default_graph();
   const Material* material = handle ? &scene.material(handle) : nullptr;
   const Graph& graph = material ? material->graph : grey;
-  const CompileHost compile_host = host(material ? "material \"" + material->name + "\"" : "default material", warnings);
+  const CompileHost compile_host =
+      host(material ? "material \"" + material->name + "\"" : "default material", warnings);
   Compiled result;
   result.handle = handle;
   result.surface = compile(graph, ProgramKind::kSurface, compile_host);
@@ -117,7 +118,8 @@ void Materials::commit(const Scene& scene, const SceneChanges& changes, std::vec
   s.materials.resize(handles.size());
   std::vector<bool> fresh(handles.size(), false);
   for (size_t k = 0; k < handles.size(); ++k) {
-    if (everything || s.materials[k].handle != handles[k] || edited.count(handles[k]) || s.materials[k].surface.code.empty()) {
+    if (everything || s.materials[k].handle != handles[k] || edited.count(handles[k]) ||
+        s.materials[k].surface.code.empty()) {
       s.materials[k] = s.compile_material(scene, handles[k], warnings);
       fresh[k] = true;
     }
@@ -128,12 +130,14 @@ void Materials::commit(const Scene& scene, const SceneChanges& changes, std::vec
     s.world = s.has_world ? compile(*world.graph, ProgramKind::kEmission, s.host("world", warnings)) : Program{};
     s.has_world &= !s.world.empty;
   }
-  if (everything || !changes.lights_added.empty() || !changes.lights_edited.empty() || !changes.lights_removed.empty()) {
+  if (everything || !changes.lights_added.empty() || !changes.lights_edited.empty() ||
+      !changes.lights_removed.empty()) {
     s.lights.clear();
     for (const Handle handle : scene.light_handles()) {
       const Light& light = scene.light(handle);
       if (!light.graph) continue;
-      s.lights[handle] = compile(*light.graph, ProgramKind::kEmission, s.host("light \"" + light.name + "\"", warnings));
+      s.lights[handle] =
+          compile(*light.graph, ProgramKind::kEmission, s.host("light \"" + light.name + "\"", warnings));
     }
   }
   s.images.load(scene, warnings);
@@ -141,9 +145,10 @@ void Materials::commit(const Scene& scene, const SceneChanges& changes, std::vec
     Compiled& m = s.materials[k];
     if (everything || fresh[k]) m.mean_emission = estimate_emission(m.emission, s.images);
   }
-  const bool geometry = !changes.meshes_added.empty() || !changes.meshes_replaced.empty() || !changes.meshes_removed.empty() ||
-                        !changes.meshes_deformed.empty() || !changes.instances_added.empty() ||
-                        !changes.instances_removed.empty() || !changes.instances_edited.empty();
+  const bool geometry = !changes.meshes_added.empty() || !changes.meshes_replaced.empty() ||
+                        !changes.meshes_removed.empty() || !changes.meshes_deformed.empty() ||
+                        !changes.instances_added.empty() || !changes.instances_removed.empty() ||
+                        !changes.instances_edited.empty();
   if (everything || geometry || s.attributes.names.size() != attributes_before) s.attributes.resolve(scene);
 }
 

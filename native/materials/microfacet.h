@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The GGX distribution of normals with Smith's masking (Walter et al. 2007; Heitz 2014), sampling of its visible normals
-// by spherical caps (Dupuy and Benyoub 2023), and Fresnel terms. All directions in the frame of the normal, z up.
+// The GGX distribution of normals with Smith's masking (Walter et al. 2007; Heitz 2014), sampling of its visible
+// normals by spherical caps (Dupuy and Benyoub 2023), and Fresnel terms. All directions in the frame of the normal, z
+// up.
 #pragma once
 
 #include "materials/surface.h"
@@ -33,8 +34,10 @@ Rgb fresnel_conductor(float cosine, const Rgb& n, const Rgb& k);
 /// Reflected share at a microfacet, by the lobe's Fresnel term. ior as the ray meets the surface.
 inline Rgb fresnel(const Lobe& lobe, float cosine) {
   switch (lobe.fresnel) {
-    case Fresnel::kNone: return Rgb(1.0f);
-    case Fresnel::kDielectric: return Rgb(fresnel_dielectric(cosine, lobe.ior));
+    case Fresnel::kNone:
+      return Rgb(1.0f);
+    case Fresnel::kDielectric:
+      return Rgb(fresnel_dielectric(cosine, lobe.ior));
     case Fresnel::kSchlick: {
       const float start = f0_from_ior(lobe.ior);
       const float share = saturate((fresnel_dielectric(cosine, lobe.ior) - start) / (1.0f - start));
@@ -45,7 +48,8 @@ inline Rgb fresnel(const Lobe& lobe, float cosine) {
       const float x = saturate(1.0f - cosine);
       return saturate(lerp(lobe.f0, Rgb(1.0f), fifth(x)) - lobe.f90 * (cosine * fifth(x) * x));
     }
-    case Fresnel::kConductor: return fresnel_conductor(cosine, lobe.f0, lobe.f90);
+    case Fresnel::kConductor:
+      return fresnel_conductor(cosine, lobe.f0, lobe.f90);
   }
   return Rgb(1.0f);
 }
@@ -80,7 +84,9 @@ inline Vec3 beckmann_sample(float ax, float ay, const Vec2& u) {
   const float r = std::sqrt(-std::log(std::fmax(1.0f - u.y, 1e-7f))), phi = 2.0f * kPi * u.x;
   return glm::normalize(Vec3(ax * r * std::cos(phi), ay * r * std::sin(phi), 1.0f));
 }
-inline bool is_beckmann(Distribution d) { return d == Distribution::kBeckmann || d == Distribution::kBeckmannSeparable; }
+inline bool is_beckmann(Distribution d) {
+  return d == Distribution::kBeckmann || d == Distribution::kBeckmannSeparable;
+}
 
 /// A visible normal for the direction o (o.z > 0), with density G1(o) D(h) (o·h) / o.z.
 inline Vec3 ggx_sample(const Vec3& o, float ax, float ay, const Vec2& u) {

@@ -10,10 +10,11 @@ namespace afterglow {
 
 bool is_closure(const std::string& type) {
   static const std::set<std::string> types{
-      "principled", "diffuse_bsdf", "glossy_bsdf", "glass_bsdf", "refraction_bsdf", "metallic_bsdf", "translucent_bsdf",
-      "transparent_bsdf", "sheen_bsdf", "subsurface_scattering", "emission", "background", "holdout", "mix_shader",
-      "add_shader", "velvet_bsdf", "toon_bsdf", "hair_bsdf", "principled_hair_bsdf", "ray_portal_bsdf", "no_shader",
-      "volume_absorption", "volume_scatter", "principled_volume", "volume_coefficients"};
+      "principled",    "diffuse_bsdf",      "glossy_bsdf",      "glass_bsdf",           "refraction_bsdf",
+      "metallic_bsdf", "translucent_bsdf",  "transparent_bsdf", "sheen_bsdf",           "subsurface_scattering",
+      "emission",      "background",        "holdout",          "mix_shader",           "add_shader",
+      "velvet_bsdf",   "toon_bsdf",         "hair_bsdf",        "principled_hair_bsdf", "ray_portal_bsdf",
+      "no_shader",     "volume_absorption", "volume_scatter",   "principled_volume",    "volume_coefficients"};
   return types.count(type) != 0;
 }
 
@@ -64,15 +65,31 @@ void Emitter::write_principled(Operand weight) {
   const Type tint = old ? Type::kFloat : Type::kColor;
   const float tint_default = old ? 0.0f : 1.0f;
   closure(Op::kPrincipled,
-          {weight, input("base_color", Type::kColor, 0.8f), input("metallic", Type::kFloat, 0.0f),
-           input("roughness", Type::kFloat, 0.5f), input("ior", Type::kFloat, old ? 1.45f : 1.5f), alpha, normal,
-           input("diffuse_roughness", Type::kFloat, 0.0f), input("specular_ior_level", Type::kFloat, 0.5f),
-           input("specular_tint", tint, tint_default), input("anisotropic", Type::kFloat, 0.0f),
-           input("anisotropic_rotation", Type::kFloat, 0.0f), linked_input("tangent", Type::kVector), transmission,
-           input("transmission_roughness", Type::kFloat, 0.0f), coat, input("coat_roughness", Type::kFloat, 0.03f),
-           input("coat_ior", Type::kFloat, 1.5f), input("coat_tint", Type::kColor, 1.0f),
-           linked_input("coat_normal", Type::kVector), sheen, input("sheen_roughness", Type::kFloat, 0.5f),
-           input("sheen_tint", tint, old ? 0.5f : 1.0f), color, strength},
+          {weight,
+           input("base_color", Type::kColor, 0.8f),
+           input("metallic", Type::kFloat, 0.0f),
+           input("roughness", Type::kFloat, 0.5f),
+           input("ior", Type::kFloat, old ? 1.45f : 1.5f),
+           alpha,
+           normal,
+           input("diffuse_roughness", Type::kFloat, 0.0f),
+           input("specular_ior_level", Type::kFloat, 0.5f),
+           input("specular_tint", tint, tint_default),
+           input("anisotropic", Type::kFloat, 0.0f),
+           input("anisotropic_rotation", Type::kFloat, 0.0f),
+           linked_input("tangent", Type::kVector),
+           transmission,
+           input("transmission_roughness", Type::kFloat, 0.0f),
+           coat,
+           input("coat_roughness", Type::kFloat, 0.03f),
+           input("coat_ior", Type::kFloat, 1.5f),
+           input("coat_tint", Type::kColor, 1.0f),
+           linked_input("coat_normal", Type::kVector),
+           sheen,
+           input("sheen_roughness", Type::kFloat, 0.5f),
+           input("sheen_tint", tint, old ? 0.5f : 1.0f),
+           color,
+           strength},
           {distribution(old ? "ggx" : "multi_ggx") == 1 ? 1u : 0u, version()});
 }
 
@@ -111,8 +128,8 @@ void Emitter::write_closure(Operand weight) {
   closure_effects |= kGlossy;
   if (type == "glossy_bsdf") {
     closure(Op::kGlossy,
-            {weight, color(0.8f), normal(), number("roughness", 0.5f), number("anisotropy", 0.0f), number("rotation", 0.0f),
-             linked_input("tangent", Type::kVector)},
+            {weight, color(0.8f), normal(), number("roughness", 0.5f), number("anisotropy", 0.0f),
+             number("rotation", 0.0f), linked_input("tangent", Type::kVector)},
             {distribution("multi_ggx"), version()});
   } else if (type == "glass_bsdf" || type == "refraction_bsdf") {
     closure_effects |= kTransmission;
@@ -125,9 +142,9 @@ void Emitter::write_closure(Operand weight) {
                           text("fresnel_type", "f82").find("physical") != std::string::npos;
     const Operand tint = input("edge_tint", Type::kColor, Vec3(0.695f, 0.726f, 0.770f));
     closure(Op::kMetallic,
-            {weight, input("base_color", Type::kColor, Vec3(0.617f, 0.577f, 0.540f)), normal(), number("roughness", 0.5f),
-             number("anisotropy", 0.0f), number("rotation", 0.0f), linked_input("tangent", Type::kVector), tint,
-             input("ior", Type::kVector, Vec3(2.757f, 2.513f, 2.231f)),
+            {weight, input("base_color", Type::kColor, Vec3(0.617f, 0.577f, 0.540f)), normal(),
+             number("roughness", 0.5f), number("anisotropy", 0.0f), number("rotation", 0.0f),
+             linked_input("tangent", Type::kVector), tint, input("ior", Type::kVector, Vec3(2.757f, 2.513f, 2.231f)),
              input("extinction", Type::kVector, Vec3(3.867f, 3.404f, 3.009f))},
             {distribution("multi_ggx"), physical ? 1u : 0u});
   } else if (type == "translucent_bsdf") {

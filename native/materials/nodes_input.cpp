@@ -38,8 +38,9 @@ std::string exact_text(Emitter& e, const char* name) {  // attribute names keep 
 
 void uv_map(Emitter& e) {
   const std::string name = exact_text(e, "uv_map");
-  e.output("uv", Type::kVector, name.empty() ? e.emit(Op::kUv, {}, {e.offset()})
-                                             : e.emit(Op::kAttribute, {}, {e.attribute(name), e.offset()}));
+  e.output(
+      "uv", Type::kVector,
+      name.empty() ? e.emit(Op::kUv, {}, {e.offset()}) : e.emit(Op::kAttribute, {}, {e.attribute(name), e.offset()}));
 }
 
 void attribute(Emitter& e) {
@@ -56,38 +57,62 @@ void attribute(Emitter& e) {
 
 void color_attribute(Emitter& e) {
   const std::string name = exact_text(e, "name");
-  const auto [value, alpha] = e.emit2(Op::kAttribute, {}, {e.attribute(name.empty() ? kActiveColor : name), e.offset()});
+  const auto [value, alpha] =
+      e.emit2(Op::kAttribute, {}, {e.attribute(name.empty() ? kActiveColor : name), e.offset()});
   e.output("color", Type::kColor, value);
   e.output("alpha", Type::kFloat, alpha);
 }
 
 void geometry(Emitter& e) {
   outputs(e, Op::kGeometry,
-          {{"position", Type::kVector}, {"normal", Type::kVector}, {"tangent", Type::kVector}, {"true_normal", Type::kVector},
-           {"incoming", Type::kVector}, {"parametric", Type::kVector}, {"backfacing", Type::kFloat},
-           {"pointiness", Type::kFloat}, {"random_per_island", Type::kFloat}}, true);
+          {{"position", Type::kVector},
+           {"normal", Type::kVector},
+           {"tangent", Type::kVector},
+           {"true_normal", Type::kVector},
+           {"incoming", Type::kVector},
+           {"parametric", Type::kVector},
+           {"backfacing", Type::kFloat},
+           {"pointiness", Type::kFloat},
+           {"random_per_island", Type::kFloat}},
+          true);
 }
 
 void light_path(Emitter& e) {
   outputs(e, Op::kLightPath,
-          {{"is_camera_ray", Type::kFloat}, {"is_shadow_ray", Type::kFloat}, {"is_diffuse_ray", Type::kFloat},
-           {"is_glossy_ray", Type::kFloat}, {"is_singular_ray", Type::kFloat}, {"is_reflection_ray", Type::kFloat},
-           {"is_transmission_ray", Type::kFloat}, {"ray_length", Type::kFloat}, {"ray_depth", Type::kFloat},
-           {"diffuse_depth", Type::kFloat}, {"glossy_depth", Type::kFloat}, {"transparent_depth", Type::kFloat},
-           {"transmission_depth", Type::kFloat}}, false);
+          {{"is_camera_ray", Type::kFloat},
+           {"is_shadow_ray", Type::kFloat},
+           {"is_diffuse_ray", Type::kFloat},
+           {"is_glossy_ray", Type::kFloat},
+           {"is_singular_ray", Type::kFloat},
+           {"is_reflection_ray", Type::kFloat},
+           {"is_transmission_ray", Type::kFloat},
+           {"ray_length", Type::kFloat},
+           {"ray_depth", Type::kFloat},
+           {"diffuse_depth", Type::kFloat},
+           {"glossy_depth", Type::kFloat},
+           {"transparent_depth", Type::kFloat},
+           {"transmission_depth", Type::kFloat}},
+          false);
 }
 
 void object_info(Emitter& e) {
   outputs(e, Op::kObjectInfo,
-          {{"location", Type::kVector}, {"color", Type::kColor}, {"alpha", Type::kFloat}, {"object_index", Type::kFloat},
-           {"material_index", Type::kFloat}, {"random", Type::kFloat}}, false);
+          {{"location", Type::kVector},
+           {"color", Type::kColor},
+           {"alpha", Type::kFloat},
+           {"object_index", Type::kFloat},
+           {"material_index", Type::kFloat},
+           {"random", Type::kFloat}},
+          false);
 }
 
 void zeros(Emitter& e) {  // particles and hair: not there
-  for (const char* name : {"index", "random", "age", "lifetime", "size", "is_strand", "intercept", "length", "thickness"}) {
+  for (const char* name :
+       {"index", "random", "age", "lifetime", "size", "is_strand", "intercept", "length", "thickness"}) {
     e.output(name, Type::kFloat, e.constant(0.0f));
   }
-  for (const char* name : {"location", "velocity", "angular_velocity", "tangent_normal"}) e.output(name, Type::kVector, e.constant(0.0f));
+  for (const char* name : {"location", "velocity", "angular_velocity", "tangent_normal"})
+    e.output(name, Type::kVector, e.constant(0.0f));
 }
 
 void camera(Emitter& e) {
@@ -98,7 +123,8 @@ void camera(Emitter& e) {
 }
 
 void fresnel(Emitter& e) {
-  e.output("fac", Type::kFloat, e.emit(Op::kFresnel, {e.input("ior", Type::kFloat, 1.5f), e.linked_input("normal", Type::kVector)}));
+  e.output("fac", Type::kFloat,
+           e.emit(Op::kFresnel, {e.input("ior", Type::kFloat, 1.5f), e.linked_input("normal", Type::kVector)}));
 }
 
 void layer_weight(Emitter& e) {
@@ -110,9 +136,14 @@ void layer_weight(Emitter& e) {
 
 void normal_map(Emitter& e) {
   const std::string space = e.text("space", "tangent"), map = exact_text(e, "uv_map");
-  const uint32_t number = space == "object" ? 1 : space == "world" ? 2 : space == "blender_object" ? 3 : space == "blender_world" ? 4 : 0;
+  const uint32_t number = space == "object"           ? 1
+                          : space == "world"          ? 2
+                          : space == "blender_object" ? 3
+                          : space == "blender_world"  ? 4
+                                                      : 0;
   e.output("normal", Type::kVector,
-           e.emit(Op::kNormalMap, {e.input("strength", Type::kFloat, 1.0f), e.input("color", Type::kColor, Vec3(0.5f, 0.5f, 1.0f))},
+           e.emit(Op::kNormalMap,
+                  {e.input("strength", Type::kFloat, 1.0f), e.input("color", Type::kColor, Vec3(0.5f, 0.5f, 1.0f))},
                   {number, map.empty() ? kNone : e.attribute(map)}));
 }
 
@@ -137,7 +168,10 @@ void vector_transform(Emitter& e) {
   const std::string kind = e.text("kind", "vector");
   e.output("vector", Type::kVector,
            e.emit(Op::kVectorTransform, {e.input("vector", Type::kVector, 0.5f)},
-                  {kind == "point" ? 1u : kind == "normal" ? 2u : 0u, space("from", "world"), space("to", "object")}));
+                  {kind == "point"    ? 1u
+                   : kind == "normal" ? 2u
+                                      : 0u,
+                   space("from", "world"), space("to", "object")}));
 }
 
 void tangent(Emitter& e) {
@@ -148,7 +182,8 @@ void tangent(Emitter& e) {
 }
 
 void wireframe(Emitter& e) {
-  e.output("fac", Type::kFloat, e.emit(Op::kWireframe, {e.input("size", Type::kFloat, 0.01f)}, {e.flag("use_pixel_size", false)}));
+  e.output("fac", Type::kFloat,
+           e.emit(Op::kWireframe, {e.input("size", Type::kFloat, 0.01f)}, {e.flag("use_pixel_size", false)}));
 }
 
 void plain_occlusion(Emitter& e) {  // needs rays: unoccluded

@@ -11,17 +11,21 @@ namespace {
 using Names = std::span<const char* const>;
 
 constexpr const char* kMathOperations[] = {
-    "add", "subtract", "multiply", "divide", "multiply_add", "power", "logarithm", "sqrt", "inverse_sqrt", "absolute",
-    "exponent", "minimum", "maximum", "less_than", "greater_than", "sign", "compare", "smooth_min", "smooth_max", "round",
-    "floor", "ceil", "trunc", "fract", "modulo", "floored_modulo", "wrap", "snap", "pingpong", "sine", "cosine", "tangent",
-    "arcsine", "arccosine", "arctangent", "arctan2", "sinh", "cosh", "tanh", "radians", "degrees"};
+    "add",          "subtract",     "multiply", "divide",     "multiply_add",   "power",     "logarithm",
+    "sqrt",         "inverse_sqrt", "absolute", "exponent",   "minimum",        "maximum",   "less_than",
+    "greater_than", "sign",         "compare",  "smooth_min", "smooth_max",     "round",     "floor",
+    "ceil",         "trunc",        "fract",    "modulo",     "floored_modulo", "wrap",      "snap",
+    "pingpong",     "sine",         "cosine",   "tangent",    "arcsine",        "arccosine", "arctangent",
+    "arctan2",      "sinh",         "cosh",     "tanh",       "radians",        "degrees"};
 constexpr const char* kVectorOperations[] = {
-    "add", "subtract", "multiply", "divide", "multiply_add", "cross_product", "project", "reflect", "refract", "faceforward",
-    "dot_product", "distance", "length", "scale", "normalize", "absolute", "power", "sign", "minimum", "maximum", "floor",
-    "ceil", "fraction", "modulo", "wrap", "snap", "sine", "cosine", "tangent", "round"};
-constexpr const char* kBlendModes[] = {
-    "mix", "darken", "multiply", "burn", "lighten", "screen", "dodge", "add", "overlay", "soft_light", "linear_light",
-    "difference", "exclusion", "subtract", "divide", "hue", "saturation", "color", "value"};
+    "add",     "subtract",    "multiply",    "divide",   "multiply_add", "cross_product", "project",   "reflect",
+    "refract", "faceforward", "dot_product", "distance", "length",       "scale",         "normalize", "absolute",
+    "power",   "sign",        "minimum",     "maximum",  "floor",        "ceil",          "fraction",  "modulo",
+    "wrap",    "snap",        "sine",        "cosine",   "tangent",      "round"};
+constexpr const char* kBlendModes[] = {"mix",          "darken",     "multiply",  "burn",     "lighten",
+                                       "screen",       "dodge",      "add",       "overlay",  "soft_light",
+                                       "linear_light", "difference", "exclusion", "subtract", "divide",
+                                       "hue",          "saturation", "color",     "value"};
 constexpr const char* kRangeKinds[] = {"linear", "stepped", "smoothstep", "smootherstep"};
 constexpr const char* kMappingKinds[] = {"point", "texture", "vector", "normal"};
 constexpr const char* kColorModels[] = {"rgb", "hsv", "hsl"};
@@ -49,10 +53,11 @@ void math(Emitter& e) {
 
 void vector_math(Emitter& e) {
   const uint32_t operation = choice(e, "operation", "add", kVectorOperations);
-  const auto [vector, value] = e.emit2(Op::kVectorMath,
-                                       {e.input("vector", Type::kVector, 0.0f), e.input("vector_001", Type::kVector, 0.0f),
-                                        e.input("vector_002", Type::kVector, 0.0f), e.input("scale", Type::kFloat, 1.0f)},
-                                       {operation});
+  const auto [vector, value] =
+      e.emit2(Op::kVectorMath,
+              {e.input("vector", Type::kVector, 0.0f), e.input("vector_001", Type::kVector, 0.0f),
+               e.input("vector_002", Type::kVector, 0.0f), e.input("scale", Type::kFloat, 1.0f)},
+              {operation});
   e.output("vector", Type::kVector, vector);
   e.output("value", Type::kFloat, value);
 }
@@ -95,7 +100,7 @@ void mix_rgb(Emitter& e) {
 void separate(Emitter& e) {
   const bool vector = e.node().type == "separate_xyz" || e.text("mode", "rgb") == "xyz" || e.linked("vector");
   const uint32_t mode = vector ? 0u : choice(e, "mode", "rgb", kColorModels);
-  const Operand in = e.linked("vector") ? e.input("vector", Type::kVector, 0.0f)
+  const Operand in = e.linked("vector")                ? e.input("vector", Type::kVector, 0.0f)
                      : e.node().inputs.count("vector") ? e.input("vector", Type::kVector, 0.0f)
                                                        : e.input("color", vector ? Type::kVector : Type::kColor, 0.8f);
   static constexpr const char* kNames[3][3] = {{"red", "x", "r"}, {"green", "y", "g"}, {"blue", "z", "b"}};
@@ -111,7 +116,8 @@ void combine(Emitter& e) {
   const auto channel = [&](const char* name, const char* other) {
     return e.node().inputs.count(other) ? e.input(other, Type::kFloat, 0.0f) : e.input(name, Type::kFloat, 0.0f);
   };
-  const Operand result = e.emit(Op::kCombine, {channel("red", "x"), channel("green", "y"), channel("blue", "z")}, {mode});
+  const Operand result =
+      e.emit(Op::kCombine, {channel("red", "x"), channel("green", "y"), channel("blue", "z")}, {mode});
   e.output("color", vector ? Type::kVector : Type::kColor, result);
   e.output("vector", vector ? Type::kVector : Type::kColor, result);
 }
@@ -140,7 +146,8 @@ void curves(Emitter& e) {
   const uint32_t width = single ? 1u : 3u;
   if (!table || table->size() < width) return e.output(name, kind, value);
   float low = 0.0f, high = 1.0f;
-  if (const std::vector<float>* range = e.table("range"); range && range->size() >= 2) low = (*range)[0], high = (*range)[1];
+  if (const std::vector<float>* range = e.table("range"); range && range->size() >= 2)
+    low = (*range)[0], high = (*range)[1];
   std::vector<uint32_t> params{width, uint32_t(table->size() / width), Emitter::bits(low), Emitter::bits(high),
                                e.flag("extrapolate", true)};
   for (const float v : *table) params.push_back(Emitter::bits(v));
@@ -149,17 +156,19 @@ void curves(Emitter& e) {
 
 void hue_saturation(Emitter& e) {
   e.output("color", Type::kColor,
-           e.emit(Op::kHueSaturation,
-                  {e.input("hue", Type::kFloat, 0.5f), e.input("saturation", Type::kFloat, 1.0f),
-                   e.input("value", Type::kFloat, 1.0f), e.input("fac", Type::kFloat, 1.0f), e.input("color", Type::kColor, 0.8f)}));
+           e.emit(Op::kHueSaturation, {e.input("hue", Type::kFloat, 0.5f), e.input("saturation", Type::kFloat, 1.0f),
+                                       e.input("value", Type::kFloat, 1.0f), e.input("fac", Type::kFloat, 1.0f),
+                                       e.input("color", Type::kColor, 0.8f)}));
 }
 
 void gamma(Emitter& e) {
-  e.output("color", Type::kColor, e.emit(Op::kGamma, {e.input("color", Type::kColor, 1.0f), e.input("gamma", Type::kFloat, 1.0f)}));
+  e.output("color", Type::kColor,
+           e.emit(Op::kGamma, {e.input("color", Type::kColor, 1.0f), e.input("gamma", Type::kFloat, 1.0f)}));
 }
 
 void invert(Emitter& e) {
-  e.output("color", Type::kColor, e.emit(Op::kInvert, {e.input("fac", Type::kFloat, 1.0f), e.input("color", Type::kColor, 0.0f)}));
+  e.output("color", Type::kColor,
+           e.emit(Op::kInvert, {e.input("fac", Type::kFloat, 1.0f), e.input("color", Type::kColor, 0.0f)}));
 }
 
 void bright_contrast(Emitter& e) {
@@ -175,7 +184,9 @@ void rgb_to_bw(Emitter& e) {
 
 void clamp(Emitter& e) {
   e.output("result", Type::kFloat,
-           e.emit(Op::kClamp, {e.input("value", Type::kFloat, 1.0f), e.input("min", Type::kFloat, 0.0f), e.input("max", Type::kFloat, 1.0f)},
+           e.emit(Op::kClamp,
+                  {e.input("value", Type::kFloat, 1.0f), e.input("min", Type::kFloat, 0.0f),
+                   e.input("max", Type::kFloat, 1.0f)},
                   {e.text("kind", "minmax") == "range"}));
 }
 
@@ -212,17 +223,21 @@ void mapping(Emitter& e) {
 
 void vector_rotate(Emitter& e) {
   const uint32_t kind = choice(e, "kind", "axis_angle", kRotations);
-  const Operand turn = kind == 4 ? e.input("rotation", Type::kVector, 0.0f) : e.input("axis", Type::kVector, Vec3(0, 0, 1));
+  const Operand turn =
+      kind == 4 ? e.input("rotation", Type::kVector, 0.0f) : e.input("axis", Type::kVector, Vec3(0, 0, 1));
   e.output("vector", Type::kVector,
-           e.emit(Op::kVectorRotate, {e.input("vector", Type::kVector, 0.0f), e.input("center", Type::kVector, 0.0f), turn,
-                                      e.input("angle", Type::kFloat, 0.0f)},
+           e.emit(Op::kVectorRotate,
+                  {e.input("vector", Type::kVector, 0.0f), e.input("center", Type::kVector, 0.0f), turn,
+                   e.input("angle", Type::kFloat, 0.0f)},
                   {kind, e.flag("invert", false)}));
 }
 
 void rgb(Emitter& e) {
   Vec3 color(0.5f);
-  if (const std::vector<float>* table = e.table("color"); table && table->size() >= 3) color = {(*table)[0], (*table)[1], (*table)[2]};
-  e.output("color", Type::kColor, e.node().inputs.count("color") ? e.input("color", Type::kColor, 0.5f) : e.constant(color));
+  if (const std::vector<float>* table = e.table("color"); table && table->size() >= 3)
+    color = {(*table)[0], (*table)[1], (*table)[2]};
+  e.output("color", Type::kColor,
+           e.node().inputs.count("color") ? e.input("color", Type::kColor, 0.5f) : e.constant(color));
 }
 
 void value(Emitter& e) { e.output("value", Type::kFloat, e.constant(float(e.number("value", 0.5)))); }
@@ -237,8 +252,10 @@ void wavelength(Emitter& e) {
 
 void normal(Emitter& e) {
   Vec3 direction(0, 0, 1);
-  if (const std::vector<float>* table = e.table("direction"); table && table->size() >= 3) direction = {(*table)[0], (*table)[1], (*table)[2]};
-  const auto [n, dot] = e.emit2(Op::kNormalNode, {e.input("normal", Type::kVector, Vec3(0, 0, 1)), e.constant(direction)});
+  if (const std::vector<float>* table = e.table("direction"); table && table->size() >= 3)
+    direction = {(*table)[0], (*table)[1], (*table)[2]};
+  const auto [n, dot] =
+      e.emit2(Op::kNormalNode, {e.input("normal", Type::kVector, Vec3(0, 0, 1)), e.constant(direction)});
   e.output("normal", Type::kVector, n);
   e.output("dot", Type::kFloat, dot);
 }
@@ -250,8 +267,10 @@ void register_math_nodes(std::unordered_map<std::string, Handler>& all) {
   all["vector_math"] = vector_math;
   all["mix"] = mix;
   all["mix_rgb"] = mix_rgb;
-  for (const char* name : {"separate", "separate_rgb", "separate_hsv", "separate_xyz", "separate_color"}) all[name] = separate;
-  for (const char* name : {"combine", "combine_rgb", "combine_hsv", "combine_xyz", "combine_color"}) all[name] = combine;
+  for (const char* name : {"separate", "separate_rgb", "separate_hsv", "separate_xyz", "separate_color"})
+    all[name] = separate;
+  for (const char* name : {"combine", "combine_rgb", "combine_hsv", "combine_xyz", "combine_color"})
+    all[name] = combine;
   all["color_ramp"] = color_ramp;
   for (const char* name : {"rgb_curve", "vector_curve", "float_curve"}) all[name] = curves;
   all["hue_saturation"] = hue_saturation;

@@ -46,10 +46,10 @@ void image_texture(Emitter& e) {
   const std::string projection = e.text("projection", "flat"), extension = e.text("extension", "repeat");
   const uint32_t how = projection == "box" ? 1u : projection == "sphere" ? 2u : projection == "tube" ? 3u : 0u;
   const uint32_t outside = extension == "extend" ? 1u : extension == "clip" ? 2u : extension == "mirror" ? 3u : 0u;
-  const auto [color, alpha] = e.emit2(Op::kImage, {texture_coordinates(e, how == 0)},
-                                      {image_number(e), interpolation(e), outside, how,
-                                       Emitter::bits(float(e.number("projection_blend", 0.0))),
-                                       e.flag("unassociate", output_linked(e, "alpha"))});
+  const auto [color, alpha] =
+      e.emit2(Op::kImage, {texture_coordinates(e, how == 0)},
+              {image_number(e), interpolation(e), outside, how, Emitter::bits(float(e.number("projection_blend", 0.0))),
+               e.flag("unassociate", output_linked(e, "alpha"))});
   e.output("color", Type::kColor, color);
   e.output("alpha", Type::kFloat, alpha);
 }
@@ -61,8 +61,9 @@ void environment_texture(Emitter& e) {
 }
 
 void checker(Emitter& e) {
-  const auto [color, fac] = e.emit2(Op::kChecker, {texture_coordinates(e, false), e.input("color1", Type::kColor, 0.8f),
-                                                   e.input("color2", Type::kColor, 0.2f), e.input("scale", Type::kFloat, 5.0f)});
+  const auto [color, fac] =
+      e.emit2(Op::kChecker, {texture_coordinates(e, false), e.input("color1", Type::kColor, 0.8f),
+                             e.input("color2", Type::kColor, 0.2f), e.input("scale", Type::kFloat, 5.0f)});
   e.output("color", Type::kColor, color);
   e.output("fac", Type::kFloat, fac);
 }

@@ -234,21 +234,30 @@ void pcg(const int32_t* cell, int count, float* out) {
 
 float gradient_noise(const float* p, int count) {
   switch (count) {
-    case 1: return perlin<1>(p);
-    case 2: return perlin<2>(p);
-    case 3: return perlin<3>(p);
-    default: return perlin<4>(p);
+    case 1:
+      return perlin<1>(p);
+    case 2:
+      return perlin<2>(p);
+    case 3:
+      return perlin<3>(p);
+    default:
+      return perlin<4>(p);
   }
 }
 
 float fractal_noise(const float* p, int count, const NoiseShape& shape) {
   const Octaves o(p, count);
   switch (shape.kind) {
-    case NoiseKind::kMultifractal: return multifractal(o, shape);
-    case NoiseKind::kHybrid: return hybrid(o, shape);
-    case NoiseKind::kRidged: return ridged(o, shape);
-    case NoiseKind::kHetero: return hetero_terrain(o, shape);
-    default: return fbm(o, shape);
+    case NoiseKind::kMultifractal:
+      return multifractal(o, shape);
+    case NoiseKind::kHybrid:
+      return hybrid(o, shape);
+    case NoiseKind::kRidged:
+      return ridged(o, shape);
+    case NoiseKind::kHetero:
+      return hetero_terrain(o, shape);
+    default:
+      return fbm(o, shape);
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Integer hashes and gradient noise: Jenkins' lookup3 over the bits of the arguments, Perlin's improved noise in one to four
-// dimensions, sums of octaves (fBm, multifractals: Musgrave et al. 1989), and the PCG hashes of Jarzynski and Olano 2020.
+// Integer hashes and gradient noise: Jenkins' lookup3 over the bits of the arguments, Perlin's improved noise in one to
+// four dimensions, sums of octaves (fBm, multifractals: Musgrave et al. 1989), and the PCG hashes of Jarzynski and
+// Olano 2020.
 #pragma once
 
 #include "base/math.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Texture instructions that need nothing but a place: noise, cells, waves, gradients, bricks, magic and white noise, each with
-// its operands taken from the program.
+// Texture instructions that need nothing but a place: noise, cells, waves, gradients, bricks, magic and white noise,
+// each with its operands taken from the program.
 #include "materials/patterns.h"
 
 #include <algorithm>
@@ -100,14 +100,18 @@ float wave(Vec3 p, float distortion, const Operands& in) {
 
 float gradient(const Vec3& p, uint32_t kind) {
   switch (kind) {
-    case 0: return p.x;
-    case 1: return sqr(std::max(p.x, 0.0f));
+    case 0:
+      return p.x;
+    case 1:
+      return sqr(std::max(p.x, 0.0f));
     case 2: {
       const float t = saturate(p.x);
       return t * t * (3.0f - 2.0f * t);
     }
-    case 3: return 0.5f * (p.x + p.y);
-    case 4: return std::atan2(p.y, p.x) * (0.5f * kInvPi) + 0.5f;
+    case 3:
+      return 0.5f * (p.x + p.y);
+    case 4:
+      return std::atan2(p.y, p.x) * (0.5f * kInvPi) + 0.5f;
     default: {
       const float r = std::max(0.999999f - glm::length(p), 0.0f);
       return kind == 5 ? r * r : r;
@@ -172,26 +176,34 @@ Vec3 bricks(const Vec3& p, const Rgb& color1, const Rgb& color2, const Operands&
 
 }  // namespace
 
-Vec3 run_pattern(const Instruction& ins, const Vec3& a, const Vec3& b, const Vec3& c, const Operands& in, Vec3* second) {
+Vec3 run_pattern(const Instruction& ins, const Vec3& a, const Vec3& b, const Vec3& c, const Operands& in,
+                 Vec3* second) {
   switch (ins.op) {
-    case Op::kNoise: return noise(a, b.x, c.x, in, ins.out != kNoOperand, second);
-    case Op::kVoronoi: return cells(a, b.x, c.x, in, second);
-    case Op::kWave: return *second = Vec3(wave(a * b.x, c.x, in));
-    case Op::kGradient: return *second = Vec3(saturate(gradient(a, in.u(0))));
+    case Op::kNoise:
+      return noise(a, b.x, c.x, in, ins.out != kNoOperand, second);
+    case Op::kVoronoi:
+      return cells(a, b.x, c.x, in, second);
+    case Op::kWave:
+      return *second = Vec3(wave(a * b.x, c.x, in));
+    case Op::kGradient:
+      return *second = Vec3(saturate(gradient(a, in.u(0))));
     case Op::kMagic: {
       const Vec3 color = magic(a, b.x, c.x, in.u(0));
       *second = Vec3(mean(color));
       return color;
     }
-    case Op::kBrick: return bricks(a, b, c, in, second);
+    case Op::kBrick:
+      return bricks(a, b, c, in, second);
     case Op::kWhiteNoise: {
       float p[4];
       const int count = place(in.u(0), a, b.x, p);
       *second = Vec3(hash_floats(p, count));
       return ins.out == kNoOperand ? *second : hash_color(p, count);
     }
-    case Op::kSky: return run_sky(a, in);
-    default: return *second = Vec3(0.5f);
+    case Op::kSky:
+      return run_sky(a, in);
+    default:
+      return *second = Vec3(0.5f);
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Procedural patterns: functions of a place alone. Hashes and gradients are those of Blender's users' files, so that a file
-// shows the same pattern.
+// Procedural patterns: functions of a place alone. Hashes and gradients are those of Blender's users' files, so that a
+// file shows the same pattern.
 #pragma once
 
 #include "materials/program.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The Principled shader in its two meanings. Since Blender 4.0: sheen over coat over metal, glass, and a dielectric over
-// diffuse, each layer taking its albedo from what lies below. Before: Burley's lobes side by side (Burley 2012, 2015).
+// The Principled shader in its two meanings. Since Blender 4.0: sheen over coat over metal, glass, and a dielectric
+// over diffuse, each layer taking its albedo from what lies below. Before: Burley's lobes side by side (Burley 2012,
+// 2015).
 #include "materials/albedo_tables.h"
 #include "materials/closures.h"
 #include "materials/sheen.h"
@@ -32,7 +33,9 @@ Rgb dielectric_fresnel(const Lobe& lobe, const Vec3& outgoing, const Rgb& f90) {
 }
 
 /// What a layer takes from those below, as Blender reckons it: compensation counts by its darkening alone.
-Rgb returned_by(const Lobe& lobe, const Vec3& outgoing) { return lobe.weight / lobe.energy * dielectric_fresnel(lobe, outgoing, lobe.f90); }
+Rgb returned_by(const Lobe& lobe, const Vec3& outgoing) {
+  return lobe.weight / lobe.energy * dielectric_fresnel(lobe, outgoing, lobe.f90);
+}
 
 }  // namespace
 
@@ -217,7 +220,8 @@ void add_principled_v1(const Operands& in, const HitContext& hit, Surface& surfa
   if (!no_glossy && specular_weight > kLeastWeight && (specular > kLeastWeight || metallic > kLeastWeight)) {
     Lobe lobe = reflection(normal, hit);
     const bool anisotropic = in.f(kAnisotropic) > 1e-4f;
-    const Vec3 tangent = !anisotropic ? Vec3(1, 0, 0) : (in.given(kTangentIn) ? in.v(kTangentIn) : default_tangent(hit));
+    const Vec3 tangent =
+        !anisotropic ? Vec3(1, 0, 0) : (in.given(kTangentIn) ? in.v(kTangentIn) : default_tangent(hit));
     set_anisotropy(lobe, roughness, in.f(kAnisotropic), in.f(kAnisotropicRotation), tangent, true);
     lobe.fresnel = Fresnel::kSchlick;
     lobe.ior = 2.0f / (1.0f - std::sqrt(std::fmin(0.08f * specular, 0.98f))) - 1.0f;
@@ -265,7 +269,8 @@ void add_principled_v1(const Operands& in, const HitContext& hit, Surface& surfa
       Lobe lobe = reflection(normal, hit);
       lobe.kind = LobeKind::kMicrofacetRefraction;
       lobe.pass = LobeClass::kTransmission;
-      const float rough = multi ? roughness : 1.0f - (1.0f - roughness) * (1.0f - saturate(in.f(kTransmissionRoughness)));
+      const float rough =
+          multi ? roughness : 1.0f - (1.0f - roughness) * (1.0f - saturate(in.f(kTransmissionRoughness)));
       lobe.alpha_x = lobe.alpha_y = std::fabs(eta - 1.0f) < 1e-4f ? 0.0f : sqr(rough);
       lobe.ior = eta;
       lobe.weight = base * (weight * through * (1.0f - f));

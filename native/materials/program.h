@@ -13,16 +13,73 @@ namespace afterglow {
 
 enum class Op : uint16_t {
   // conversions and arithmetic: nothing but their operands
-  kLuminance, kAverage, kReplicate, kMath, kVectorMath, kMixFloat, kMixVector, kMixColor, kClamp, kMapRange, kMapVectorRange,
-  kSeparate, kCombine, kRamp, kCurves, kHueSaturation, kGamma, kInvert, kBrightContrast, kMapping, kBlackbody, kWavelength,
-  kNormalNode, kChecker, kNoise, kVoronoi, kWave, kGradient, kMagic, kBrick, kWhiteNoise, kGabor, kSky,
-  kVectorRotate, kOneMinus, kMatrix,
+  kLuminance,
+  kAverage,
+  kReplicate,
+  kMath,
+  kVectorMath,
+  kMixFloat,
+  kMixVector,
+  kMixColor,
+  kClamp,
+  kMapRange,
+  kMapVectorRange,
+  kSeparate,
+  kCombine,
+  kRamp,
+  kCurves,
+  kHueSaturation,
+  kGamma,
+  kInvert,
+  kBrightContrast,
+  kMapping,
+  kBlackbody,
+  kWavelength,
+  kNormalNode,
+  kChecker,
+  kNoise,
+  kVoronoi,
+  kWave,
+  kGradient,
+  kMagic,
+  kBrick,
+  kWhiteNoise,
+  kGabor,
+  kSky,
+  kVectorRotate,
+  kOneMinus,
+  kMatrix,
   // what reads the hit
-  kFirstHitOp, kTexCoord = kFirstHitOp, kUv, kAttribute, kGeometry, kLightPath, kObjectInfo, kCamera, kNormalMap, kBump,
-  kFresnel, kLayerWeight, kVectorTransform, kTangent, kWireframe, kImage, kEnvironment,
+  kFirstHitOp,
+  kTexCoord = kFirstHitOp,
+  kUv,
+  kAttribute,
+  kGeometry,
+  kLightPath,
+  kObjectInfo,
+  kCamera,
+  kNormalMap,
+  kBump,
+  kFresnel,
+  kLayerWeight,
+  kVectorTransform,
+  kTangent,
+  kWireframe,
+  kImage,
+  kEnvironment,
   // closures: add to the Surface
-  kFirstClosure, kDiffuse = kFirstClosure, kTranslucent, kGlossy, kGlass, kRefraction, kMetallic, kSheenLobe, kTransparent,
-  kEmission, kHoldout, kPrincipled,
+  kFirstClosure,
+  kDiffuse = kFirstClosure,
+  kTranslucent,
+  kGlossy,
+  kGlass,
+  kRefraction,
+  kMetallic,
+  kSheenLobe,
+  kTransparent,
+  kEmission,
+  kHoldout,
+  kPrincipled,
 };
 
 inline constexpr uint16_t kConstantBit = 0x8000, kNoOperand = 0xffff;
@@ -43,7 +100,7 @@ struct Program {
   std::vector<Vec3> constants;
   std::vector<uint32_t> pool;
   uint32_t registers = 0;
-  uint32_t effects = 0;      // Effect bits
+  uint32_t effects = 0;  // Effect bits
   bool reads_uv = false;
   bool reads_offsets = false;  // has a bump: neighbours of the point are needed
   bool folded = false;         // `ready` is the whole result but for normals
@@ -86,7 +143,8 @@ void run(const Program&, HitContext&, Surface&);
 
 // Instructions too long for the interpreter's own file.
 float run_math(uint32_t operation, float a, float b, float c);
-void run_vector_math(uint32_t operation, const Vec3& a, const Vec3& b, const Vec3& c, float scale, Vec3& vector, float& value);
+void run_vector_math(uint32_t operation, const Vec3& a, const Vec3& b, const Vec3& c, float scale, Vec3& vector,
+                     float& value);
 Rgb blend(uint32_t mode, float factor, const Rgb& a, const Rgb& b);
 void add_closure(Op, const Operands&, const HitContext&, Surface&);
 Vec3 read_hit(const Instruction&, const Operands&, const HitContext&, Vec3* out2);

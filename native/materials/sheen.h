@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sheen of cloth: a volume of fibres over the surface, as a linearly transformed cosine (Zeltner, Burley and Chiang 2022).
-// The transform's two coefficients come from rational fits to the paper's table (their numbers as the MaterialX standard
-// publishes them), the albedo from a table (sheen_table.h).
+// Sheen of cloth: a volume of fibres over the surface, as a linearly transformed cosine (Zeltner, Burley and Chiang
+// 2022). The transform's two coefficients come from rational fits to the paper's table (their numbers as the MaterialX
+// standard publishes them), the albedo from a table (sheen_table.h).
 #pragma once
 
 #include "materials/microfacet.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Skies: see sky.h. The atmosphere: Rayleigh and Mie scattering and ozone's absorption along the ray and on towards the sun, at
-// eleven wavelengths (Nishita et al. 1993; ozone as a layer about 25 km up). Directions are Blender's: the sun's rotation turns
-// from +y towards +x.
+// Skies: see sky.h. The atmosphere: Rayleigh and Mie scattering and ozone's absorption along the ray and on towards the
+// sun, at eleven wavelengths (Nishita et al. 1993; ozone as a layer about 25 km up). Directions are Blender's: the
+// sun's rotation turns from +y towards +x.
 #include "materials/sky.h"
 
 #include <algorithm>
@@ -18,7 +18,8 @@ constexpr int kWavelengths = 11;  // 400, 430, … 700 nm
 constexpr float kEarth = 6360e3f, kTop = 6420e3f;
 
 Rgb xyz_to_rgb(const Vec3& c) {
-  return {3.2404542f * c.x - 1.5371385f * c.y - 0.4985314f * c.z, -0.9692660f * c.x + 1.8760108f * c.y + 0.0415560f * c.z,
+  return {3.2404542f * c.x - 1.5371385f * c.y - 0.4985314f * c.z,
+          -0.9692660f * c.x + 1.8760108f * c.y + 0.0415560f * c.z,
           0.0556434f * c.x - 0.2040259f * c.y + 1.0572252f * c.z};
 }
 
@@ -47,11 +48,12 @@ Vec3 preetham(const Vec3& d, const Operands& in) {
 using Spectrum = std::array<float, kWavelengths>;
 
 float nanometres(int k) { return 400.0f + 30.0f * float(k); }
-// Sunlight outside of the atmosphere, W/(m² nm), every 30 nm from 400 (ASTM E-490, rounded, and lessened by 14 to 17 % so that
-// a clear sky is as bright as Blender 5.0's with single scattering: within 4 % over the upper half).
+// Sunlight outside of the atmosphere, W/(m² nm), every 30 nm from 400 (ASTM E-490, rounded, and lessened by 14 to 17 %
+// so that a clear sky is as bright as Blender 5.0's with single scattering: within 4 % over the upper half).
 constexpr Spectrum kSun{1.33f, 1.37f, 1.70f, 1.63f, 1.61f, 1.60f, 1.57f, 1.50f, 1.42f, 1.31f, 1.23f};
 // Ozone's absorption per metre at the layer's middle.
-constexpr Spectrum kOzone{4.0e-9f, 3.0e-8f, 2.0e-7f, 4.8e-7f, 9.5e-7f, 1.5e-6f, 2.1e-6f, 2.3e-6f, 1.5e-6f, 8.5e-7f, 4.5e-7f};
+constexpr Spectrum kOzone{4.0e-9f, 3.0e-8f, 2.0e-7f, 4.8e-7f, 9.5e-7f, 1.5e-6f,
+                          2.1e-6f, 2.3e-6f, 1.5e-6f, 8.5e-7f, 4.5e-7f};
 
 float rayleigh(int k) { return 5.8e-6f * std::pow(680.0f / nanometres(k), 4.0f); }
 constexpr float kMie = 2.0e-5f, kMieForward = 0.76f;
@@ -84,7 +86,8 @@ Densities column(const Vec3& p, const Vec3& d, int steps) {
 }
 
 float extinction(const Densities& column, const Atmosphere& a, int k) {
-  return rayleigh(k) * column.air * a.air + 1.11f * kMie * column.dust * a.dust + kOzone[size_t(k)] * column.ozone * a.ozone;
+  return rayleigh(k) * column.air * a.air + 1.11f * kMie * column.dust * a.dust +
+         kOzone[size_t(k)] * column.ozone * a.ozone;
 }
 
 /// Light scattered once along a ray from the ground.
@@ -136,8 +139,10 @@ Vec3 atmosphere(const Vec3& d, const Operands& in) {
   const float elevation = std::asin(std::clamp(d.z, -1.0f, 1.0f));
   const float fx = (turn - std::floor(turn)) * kTableWidth;
   float up = 0.0f, fade = 1.0f;
-  if (elevation >= 0.0f) up = std::sqrt(elevation * 2.0f * kInvPi) * (kTableHeight - 1);
-  else fade = std::max(0.0f, 1.0f + elevation * 2.5f), fade = fade * fade * fade;  // towards the dark ground
+  if (elevation >= 0.0f)
+    up = std::sqrt(elevation * 2.0f * kInvPi) * (kTableHeight - 1);
+  else
+    fade = std::max(0.0f, 1.0f + elevation * 2.5f), fade = fade * fade * fade;  // towards the dark ground
   const int x = int(fx) % kTableWidth, next = (x + 1) % kTableWidth, y = std::min(int(up), kTableHeight - 2);
   const float tx = fx - std::floor(fx), ty = up - float(y);
   const auto at = [&](int column, int row) {
@@ -154,16 +159,19 @@ std::vector<float> preetham_parameters(const Vec3& toward, float t) {
   const Vec3 sun = length > 0.0f ? toward / length : Vec3(0, 0, 1);
   const float a = std::acos(std::clamp(sun.z, -1.0f, 1.0f)), a2 = a * a, a3 = a2 * a;
   const float chi = (4.0f / 9.0f - t / 120.0f) * (kPi - 2.0f * a);
-  const float zenith[3] = {
-      ((4.0453f * t - 4.9710f) * std::tan(chi) - 0.2155f * t + 2.4192f) * 0.06f,
-      (0.00166f * a3 - 0.00375f * a2 + 0.00209f * a) * t * t + (-0.02903f * a3 + 0.06377f * a2 - 0.03202f * a + 0.00394f) * t +
-          (0.11693f * a3 - 0.21196f * a2 + 0.06052f * a + 0.25886f),
-      (0.00275f * a3 - 0.00610f * a2 + 0.00317f * a) * t * t + (-0.04214f * a3 + 0.08970f * a2 - 0.04153f * a + 0.00516f) * t +
-          (0.15346f * a3 - 0.26756f * a2 + 0.06670f * a + 0.26688f)};
-  const float shape[3][5] = {
-      {0.1787f * t - 1.4630f, -0.3554f * t + 0.4275f, -0.0227f * t + 5.3251f, 0.1206f * t - 2.5771f, -0.0670f * t + 0.3703f},
-      {-0.0193f * t - 0.2592f, -0.0665f * t + 0.0008f, -0.0004f * t + 0.2125f, -0.0641f * t - 0.8989f, -0.0033f * t + 0.0452f},
-      {-0.0167f * t - 0.2608f, -0.0950f * t + 0.0092f, -0.0079f * t + 0.2102f, -0.0441f * t - 1.6537f, -0.0109f * t + 0.0529f}};
+  const float zenith[3] = {((4.0453f * t - 4.9710f) * std::tan(chi) - 0.2155f * t + 2.4192f) * 0.06f,
+                           (0.00166f * a3 - 0.00375f * a2 + 0.00209f * a) * t * t +
+                               (-0.02903f * a3 + 0.06377f * a2 - 0.03202f * a + 0.00394f) * t +
+                               (0.11693f * a3 - 0.21196f * a2 + 0.06052f * a + 0.25886f),
+                           (0.00275f * a3 - 0.00610f * a2 + 0.00317f * a) * t * t +
+                               (-0.04214f * a3 + 0.08970f * a2 - 0.04153f * a + 0.00516f) * t +
+                               (0.15346f * a3 - 0.26756f * a2 + 0.06670f * a + 0.26688f)};
+  const float shape[3][5] = {{0.1787f * t - 1.4630f, -0.3554f * t + 0.4275f, -0.0227f * t + 5.3251f,
+                              0.1206f * t - 2.5771f, -0.0670f * t + 0.3703f},
+                             {-0.0193f * t - 0.2592f, -0.0665f * t + 0.0008f, -0.0004f * t + 0.2125f,
+                              -0.0641f * t - 0.8989f, -0.0033f * t + 0.0452f},
+                             {-0.0167f * t - 0.2608f, -0.0950f * t + 0.0092f, -0.0079f * t + 0.2102f,
+                              -0.0441f * t - 1.6537f, -0.0109f * t + 0.0529f}};
   std::vector<float> all{sun.x, sun.y, sun.z};
   for (int k = 0; k < 3; ++k) {
     all.push_back(zenith[k] / perez(shape[k], 0.0f, a));

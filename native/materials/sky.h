@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Clear skies over a direction: the analytic daylight of Preetham, Shirley and Smits 1999, and an atmosphere in which light
-// scatters once (Nishita et al. 1993), tabulated when the program is made.
+// Clear skies over a direction: the analytic daylight of Preetham, Shirley and Smits 1999, and an atmosphere in which
+// light scatters once (Nishita et al. 1993), tabulated when the program is made.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,8 @@
 
 namespace afterglow {
 
-/// Parameters of a Preetham sky: sun's polar angles, then three sets of zenith value and five coefficients (20 numbers).
+/// Parameters of a Preetham sky: sun's polar angles, then three sets of zenith value and five coefficients (20
+/// numbers).
 std::vector<float> preetham_parameters(const Vec3& sun, float turbidity);
 
 struct Atmosphere {

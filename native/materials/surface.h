@@ -23,8 +23,8 @@ enum class LobeKind : uint8_t {
   kMicrofacetRefraction,
 };
 
-/// Which Fresnel term a microfacet lobe takes, and what f0 and f90 mean to it. In a glass lobe f90 is always the tint of
-/// what goes through, and the reflected end point is 1.
+/// Which Fresnel term a microfacet lobe takes, and what f0 and f90 mean to it. In a glass lobe f90 is always the tint
+/// of what goes through, and the reflected end point is 1.
 enum class Fresnel : uint8_t {
   kNone,        // 1
   kDielectric,  // exact, unpolarised, from ior; glass: reflection tinted by f0
@@ -39,7 +39,7 @@ enum class Distribution : uint8_t {
   kGgxSeparable,  // masking and shadowing apart, as Blender before 4.0
   kBeckmann,
   kBeckmannSeparable,
-  kGtr1,          // clearcoat before 4.0
+  kGtr1,  // clearcoat before 4.0
 };
 
 inline constexpr float kMirrorAlpha = 7e-4f;  // below: a delta
@@ -59,7 +59,8 @@ struct alignas(16) Lobe {
   float alpha_x = 0.0f, alpha_y = 0.0f;  // squared roughness; below kMirrorAlpha the lobe is a delta
   float ior = 1.5f;                      // inside over outside as the ray meets it
   Rgb f0{0.0f}, f90{1.0f};               // Fresnel end points or edge tint
-  float energy = 1.0f;  // share of the weight that compensates for multiple scattering (Turquin 2019): not of the albedo
+  float energy =
+      1.0f;  // share of the weight that compensates for multiple scattering (Turquin 2019): not of the albedo
 };
 
 struct Surface {
@@ -70,7 +71,7 @@ struct Surface {
   Rgb transparency{0.0f};  // share of light that goes straight through
   float holdout = 0.0f;
   bool needs_frame = false;  // folded: lobe normals are yet to be set from the point
-  union {  // only the first `count` are alive; the rest costs nothing
+  union {                    // only the first `count` are alive; the rest costs nothing
     Lobe lobes[kMaxLobes];
   };
   Surface() {}

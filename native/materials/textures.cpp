@@ -69,7 +69,9 @@ Vec3 image(const Vec3& at, const Operands& in, const HitContext& hit, Vec3* alph
     *alpha = Vec3(1.0f);
     return {1.0f, 0.0f, 1.0f};
   }
-  const auto sample = [&](const Vec2& uv) { return hit.images->sample(in.u(0), uv, interpolation, extension, in.u(5) != 0); };
+  const auto sample = [&](const Vec2& uv) {
+    return hit.images->sample(in.u(0), uv, interpolation, extension, in.u(5) != 0);
+  };
   Vec4 value(0.0f);
   switch (in.u(3)) {
     case kBox: {
@@ -79,9 +81,14 @@ Vec3 image(const Vec3& at, const Operands& in, const HitContext& hit, Vec3* alph
       if (shares.z > 0.0f) value += shares.z * sample({normal.z > 0.0f ? 1.0f - at.y : at.y, at.x});
       break;
     }
-    case kSphere: value = sample(on_sphere(at * 2.0f - 1.0f)); break;
-    case kTube: value = sample(on_tube(at * 2.0f - 1.0f)); break;
-    default: value = sample({at.x, at.y});
+    case kSphere:
+      value = sample(on_sphere(at * 2.0f - 1.0f));
+      break;
+    case kTube:
+      value = sample(on_tube(at * 2.0f - 1.0f));
+      break;
+    default:
+      value = sample({at.x, at.y});
   }
   *alpha = Vec3(value.w);
   return Vec3(value);
@@ -109,9 +116,12 @@ Vec3 run_texture(const Instruction& ins, const Operands& in, const HitContext& h
   const auto operand = [&](uint16_t index) { return index == kNoOperand ? Vec3(0.0f) : in.at(index); };
   const Vec3 a = operand(ins.a);
   switch (ins.op) {
-    case Op::kImage: return image(a, in, hit, second);
-    case Op::kEnvironment: return environment(a, in, hit);
-    default: return run_pattern(ins, a, operand(ins.b), operand(ins.c), in, second);
+    case Op::kImage:
+      return image(a, in, hit, second);
+    case Op::kEnvironment:
+      return environment(a, in, hit);
+    default:
+      return run_pattern(ins, a, operand(ins.b), operand(ins.c), in, second);
   }
 }
 

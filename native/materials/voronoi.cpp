@@ -71,10 +71,14 @@ struct Cells {
     float sum = 0.0f;
     for (int k = 0; k < N; ++k) {
       const float d = std::fabs(a.v[k] - local[k]);
-      if (N == 1 || shape.metric == VoronoiMetric::kManhattan) sum += d;
-      else if (shape.metric == VoronoiMetric::kChebychev) sum = std::max(sum, d);
-      else if (shape.metric == VoronoiMetric::kMinkowski) sum += std::pow(d, shape.exponent);
-      else sum += d * d;
+      if (N == 1 || shape.metric == VoronoiMetric::kManhattan)
+        sum += d;
+      else if (shape.metric == VoronoiMetric::kChebychev)
+        sum = std::max(sum, d);
+      else if (shape.metric == VoronoiMetric::kMinkowski)
+        sum += std::pow(d, shape.exponent);
+      else
+        sum += d * d;
     }
     if (N == 1) return sum;
     if (shape.metric == VoronoiMetric::kMinkowski) return std::pow(sum, 1.0f / shape.exponent);
@@ -197,21 +201,29 @@ template <int N>
 VoronoiValue one_octave(const float* p, const VoronoiShape& shape) {
   const Cells<N> cells(p, shape);
   switch (shape.feature) {
-    case VoronoiFeature::kF1: return nearest<N>(cells, false);
-    case VoronoiFeature::kF2: return nearest<N>(cells, true);
+    case VoronoiFeature::kF1:
+      return nearest<N>(cells, false);
+    case VoronoiFeature::kF2:
+      return nearest<N>(cells, true);
     case VoronoiFeature::kSmoothF1:
       return shape.smoothness > 0.0f ? smooth_nearest<N>(cells) : nearest<N>(cells, false);
-    case VoronoiFeature::kEdge: return {edge_distance<N>(cells), Vec3(0.0f), Vec4(0.0f)};
-    default: return {sphere_radius<N>(cells), Vec3(0.0f), Vec4(0.0f)};
+    case VoronoiFeature::kEdge:
+      return {edge_distance<N>(cells), Vec3(0.0f), Vec4(0.0f)};
+    default:
+      return {sphere_radius<N>(cells), Vec3(0.0f), Vec4(0.0f)};
   }
 }
 
 VoronoiValue octave(const float* p, int count, const VoronoiShape& shape) {
   switch (count) {
-    case 1: return one_octave<1>(p, shape);
-    case 2: return one_octave<2>(p, shape);
-    case 3: return one_octave<3>(p, shape);
-    default: return one_octave<4>(p, shape);
+    case 1:
+      return one_octave<1>(p, shape);
+    case 2:
+      return one_octave<2>(p, shape);
+    case 3:
+      return one_octave<3>(p, shape);
+    default:
+      return one_octave<4>(p, shape);
   }
 }
 

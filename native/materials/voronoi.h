@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cellular patterns (Worley 1996) in one to four dimensions: nearest points, smooth minimum, distance to the border between
-// cells (Quilez 2012), and sums of octaves.
+// Cellular patterns (Worley 1996) in one to four dimensions: nearest points, smooth minimum, distance to the border
+// between cells (Quilez 2012), and sums of octaves.
 #pragma once
 
 #include "base/math.h"
@@ -13,7 +13,8 @@ enum class VoronoiMetric : uint32_t { kEuclidean, kManhattan, kChebychev, kMinko
 struct VoronoiShape {
   VoronoiFeature feature = VoronoiFeature::kF1;
   VoronoiMetric metric = VoronoiMetric::kEuclidean;
-  float detail = 0.0f, roughness = 0.5f, lacunarity = 2.0f, smoothness = 1.0f, exponent = 0.5f, randomness = 1.0f, scale = 1.0f;
+  float detail = 0.0f, roughness = 0.5f, lacunarity = 2.0f, smoothness = 1.0f, exponent = 0.5f, randomness = 1.0f,
+        scale = 1.0f;
   bool normalize = false;
 };
 

@@ -33,18 +33,26 @@ PointSetup setup_from(const py::kwargs& options) {
   PointSetup setup;
   for (const auto& [key, value] : options) {
     const std::string name = py::str(key);
-    if (name == "backfacing") setup.backfacing = value.cast<bool>();
-    else if (name == "drop_glossy") setup.drop_glossy = value.cast<bool>();
-    else if (name == "drop_refractive") setup.drop_refractive = value.cast<bool>();
-    else if (name == "fold") setup.fold = value.cast<bool>();
-    else if (name == "kind") setup.kind = value.cast<uint32_t>();
-    else if (name == "diffuse_only") setup.diffuse_only = value.cast<bool>();
-    else throw InvalidInput("unknown keyword \"" + name + "\"");
+    if (name == "backfacing")
+      setup.backfacing = value.cast<bool>();
+    else if (name == "drop_glossy")
+      setup.drop_glossy = value.cast<bool>();
+    else if (name == "drop_refractive")
+      setup.drop_refractive = value.cast<bool>();
+    else if (name == "fold")
+      setup.fold = value.cast<bool>();
+    else if (name == "kind")
+      setup.kind = value.cast<uint32_t>();
+    else if (name == "diffuse_only")
+      setup.diffuse_only = value.cast<bool>();
+    else
+      throw InvalidInput("unknown keyword \"" + name + "\"");
   }
   return setup;
 }
 
-py::tuple bsdf_evaluate(const py::handle& graph, const py::handle& wo, const py::handle& wi, const py::kwargs& options) {
+py::tuple bsdf_evaluate(const py::handle& graph, const py::handle& wo, const py::handle& wi,
+                        const py::kwargs& options) {
   const Standalone material(graph_from_python(graph, "graph"), setup_from(options));
   const Floats o = numbers<float>(wo, "wo", 3), i = numbers<float>(wi, "wi", 3);
   const py::ssize_t count = std::max(o.shape(0), i.shape(0));
@@ -61,7 +69,8 @@ py::tuple bsdf_evaluate(const py::handle& graph, const py::handle& wo, const py:
   return py::make_tuple(value, density);
 }
 
-py::dict bsdf_sample(const py::handle& graph, const py::handle& wo, const py::handle& numbers_in, const py::kwargs& options) {
+py::dict bsdf_sample(const py::handle& graph, const py::handle& wo, const py::handle& numbers_in,
+                     const py::kwargs& options) {
   const Standalone material(graph_from_python(graph, "graph"), setup_from(options));
   const Floats o = numbers<float>(wo, "wo", 3), u = numbers<float>(numbers_in, "u", 3);
   const py::ssize_t count = u.shape(0);
@@ -105,17 +114,23 @@ py::dict evaluate_graph(const py::handle& graph, const py::dict& points, const p
     SurfacePoint point{{0, 0, 0}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
     for (const auto& [name, array] : arrays) {
       const float* v = array.data() + (array.shape(0) == 1 ? 0 : array.shape(1) * k);
-      if (name == "uv") point.uv = {v[0], v[1]};
-      else if (name == "position") point.position = {v[0], v[1], v[2]};
-      else if (name == "normal") point.normal = unit({v[0], v[1], v[2]});
-      else if (name == "face_normal") point.face_normal = unit({v[0], v[1], v[2]});
-      else point.outgoing = unit({v[0], v[1], v[2]});
+      if (name == "uv")
+        point.uv = {v[0], v[1]};
+      else if (name == "position")
+        point.position = {v[0], v[1], v[2]};
+      else if (name == "normal")
+        point.normal = unit({v[0], v[1], v[2]});
+      else if (name == "face_normal")
+        point.face_normal = unit({v[0], v[1], v[2]});
+      else
+        point.outgoing = unit({v[0], v[1], v[2]});
     }
     Surface surface;
     material.shade(point, surface);
     const SurfaceAlbedo a = albedo(surface, point.outgoing);
-    const Vec3 values[] = {surface.emission, surface.transparency, a.diffuse, a.glossy, a.transmission,
-                           surface.count ? surface.lobes[0].normal : point.normal};
+    const Vec3 values[] = {surface.emission, surface.transparency,
+                           a.diffuse,        a.glossy,
+                           a.transmission,   surface.count ? surface.lobes[0].normal : point.normal};
     for (int n = 0; n < 6; ++n) store(out[size_t(n)], k, values[n]);
     lobes.mutable_data()[k] = surface.count;
   }
