@@ -277,8 +277,17 @@ Rgb fresnel_conductor(float cosine, const Rgb& n, const Rgb& k) {
   return 0.5f * (parallel + perpendicular);
 }
 
+namespace {
+
+bool lambert_alone(const Surface& surface) {
+  return surface.count == 1 && surface.lobes[0].kind == LobeKind::kLambert && !surface.lobes[0].bumped;
+}
+
+}  // namespace
+
 template <>
 BsdfValue evaluate<false>(const Surface& surface, const Vec3& face, const Vec3& outgoing, const Vec3& incoming) {
+  if (lambert_alone(surface)) return evaluate<true>(surface, face, outgoing, incoming);
   BsdfValue total;
   const bool transmitted = glm::dot(face, incoming) < 0.0f;
   for (int k = 0; k < surface.count; ++k) {
@@ -293,6 +302,7 @@ BsdfValue evaluate<false>(const Surface& surface, const Vec3& face, const Vec3& 
 
 template <>
 BsdfSample sample<false>(const Surface& surface, const Vec3& face, const Vec3& outgoing, float u_lobe, const Vec2& u) {
+  if (lambert_alone(surface)) return sample<true>(surface, face, outgoing, u_lobe, u);
   BsdfSample result;
   int chosen = 0;
   for (; chosen < surface.count - 1 && u_lobe >= surface.lobes[chosen].sampling_weight; ++chosen) {

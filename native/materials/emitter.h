@@ -51,6 +51,8 @@ class Emitter {
   bool flag(const char* name, bool missing) const;
   const std::vector<float>* table(const char* name) const;
   void warn(const std::string& text) const;
+  /// 1: what the node meant before Blender 4.0.
+  uint32_t version() const { return number("version", 2) == 1 ? 1u : 2u; }
 
   Operand constant(const Vec3&);
   Operand constant(float v) { return constant(Vec3(v)); }
@@ -84,7 +86,6 @@ class Emitter {
   void write_principled(Operand weight);
   void closure(Op, std::vector<Operand> inputs, std::vector<uint32_t> params = {});
   uint32_t distribution(const char* missing) const;
-  uint32_t version() const { return number("version", 2) == 1 ? 1u : 2u; }
   Operand resolve(const Link&, Type, uint32_t offset, bool& found);
   Program lower();
 

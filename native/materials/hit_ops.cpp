@@ -253,6 +253,11 @@ Vec3 bump(const Instruction& ins, const Operands& in,
   return unit_or(lerp(n, unit_or(bent, n), strength), n);
 }
 
+/// Before Blender 4.0 these nodes themselves kept the mirror direction above the surface, for diffuse lobes, too.
+Vec3 bent_normal(const Vec3& n, uint32_t version, const SurfacePoint& p) {
+  return version == 1 ? reflecting_normal(n, p.face_normal, p.outgoing) : n;
+}
+
 Vec3 vector_transform(const Operands& in, const HitContext& hit, Vec3 v) {  // kind, from, to
   const uint32_t kind = in.u(0), from = in.u(1), to = in.u(2);              // 0 world, 1 object, 2 camera
   const InstanceRecord* record = instance_of(hit, *hit.points[0]);
@@ -320,9 +325,9 @@ Vec3 read_hit(const Instruction& ins, const Operands& in, const HitContext& hit,
       return unit_or(q, Vec3(0, 0, 1));
     }
     case Op::kNormalMap:
-      return normal_map(ins, in, hit);
+      return bent_normal(normal_map(ins, in, hit), in.u(2), p);
     case Op::kBump:
-      return bump(ins, in, hit);
+      return bent_normal(bump(ins, in, hit), in.u(4), p);
     case Op::kFresnel: {
       const float eta = std::max(in.at(ins.a).x, 1e-5f);
       const Vec3 n = ins.b == kNoOperand ? p.normal : unit_or(in.at(ins.b), p.normal);

@@ -144,7 +144,7 @@ void normal_map(Emitter& e) {
   e.output("normal", Type::kVector,
            e.emit(Op::kNormalMap,
                   {e.input("strength", Type::kFloat, 1.0f), e.input("color", Type::kColor, Vec3(0.5f, 0.5f, 1.0f))},
-                  {number, map.empty() ? kNone : e.attribute(map)}));
+                  {number, map.empty() ? kNone : e.attribute(map), e.version()}));
 }
 
 void bump(Emitter& e) {
@@ -157,7 +157,7 @@ void bump(Emitter& e) {
                   {e.input_at("height", Type::kFloat, 0, 1.0f), e.input_at("height", Type::kFloat, 1, 1.0f),
                    e.input_at("height", Type::kFloat, 2, 1.0f), e.input("strength", Type::kFloat, 1.0f),
                    e.input("distance", Type::kFloat, 1.0f), normal},
-                  {Emitter::bits(e.flag("invert", false) ? -1.0f : 1.0f)}));
+                  {Emitter::bits(e.flag("invert", false) ? -1.0f : 1.0f), e.version()}));
 }
 
 void vector_transform(Emitter& e) {

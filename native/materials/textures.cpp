@@ -50,7 +50,7 @@ Vec3 box_shares(const Vec3& normal, float mix) {
   if (!(mix > 0.0f)) return {1.0f, 0.0f, 0.0f};
   for (int k = 0; k < 3; ++k) {  // two axes against the third
     const float a = n[(k + 1) % 3], b = n[(k + 2) % 3];
-    if (n[k] < (1.0f - limit) * (a + n[k]) && n[k] < (1.0f - limit) * (b + n[k])) {
+    if (n[k] < (1.0f - limit) * (a + b)) {
       Vec3 two(0.0f);
       const float share = std::clamp((a / (a + b) - 0.5f * (1.0f - mix)) / mix, 0.0f, 1.0f);
       two[(k + 1) % 3] = share, two[(k + 2) % 3] = 1.0f - share;

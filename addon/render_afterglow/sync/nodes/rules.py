@@ -101,7 +101,8 @@ def bump_node(compiler: Compiler, view: NodeView) -> Outputs:
         return {"Normal": view.input("Normal")}
     given = {"strength": view.input("Strength"), "distance": view.input("Distance"), "height": view.input("Height"),
              "normal": view.input("Normal")}
-    return {"Normal": compiler.link("normal", "bump", view.node.name, given, invert=view.node.invert)}
+    return {"Normal": compiler.link("normal", "bump", view.node.name, given, invert=view.node.invert,
+                                    version=closures.generation("bump"))}
 
 
 def displacement_node(compiler: Compiler, view: NodeView) -> Outputs:
@@ -185,7 +186,8 @@ RULES: dict[str, Rule] = {
     "ShaderNodeMapRange": map_range_node,
     "ShaderNodeMapping": plain("mapping", lambda n: {"kind": n.vector_type.lower()}),
     "ShaderNodeNormalMap": renamed("normal_map", {"Strength": "strength", "Color": "color"}, {"Normal": "normal"},
-                                   lambda n: {"space": n.space.lower(), "uv_map": n.uv_map}),
+                                   lambda n: {"space": n.space.lower(), "uv_map": n.uv_map,
+                                              "version": closures.generation("normal_map")}),
     "ShaderNodeBump": bump_node,
     "ShaderNodeNormal": normal_node,
     "ShaderNodeDisplacement": displacement_node,
