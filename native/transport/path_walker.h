@@ -75,11 +75,6 @@ class Walker {
       sampler.set_dimension(kCameraDimensions + vertex * kVertexDimensions);
       const float u_light = sampler.next1(), u_end = sampler.next1();
       const Vec2 u_emitter = sampler.next2();
-      const float p = survival(path.throughput, path.context.depth, kStraight ? path.context.transparent_depth : 0);
-      if (p < 1.0f) {
-        if (!(u_end < p)) return;
-        path.throughput /= p;
-      }
       if (!visitor.surface(path, point, surface)) return;
       const float straight = kStraight ? straight_probability(surface) : 0.0f;
       if (surface.count && straight < 1.0f)
@@ -89,10 +84,12 @@ class Walker {
       if constexpr (kStraight) {
         if (straight > 0.0f && u_straight < straight) {
           pass_straight(path, point, surface.transparency / straight);
+          if (!survives(path, u_end)) return;
           continue;
         }
       }
       if (!surface.count || !scatter(path, point, surface, 1.0f - straight, u_lobe, u, visitor)) return;
+      if (!survives(path, u_end)) return;
       counts_.bounce++;
     }
   }
@@ -119,6 +116,14 @@ class Walker {
   float emission_weight(const PathState& path, const SurfacePoint& point) const {
     if (!(path.density > 0.0f) || !scene_.materials.emits(point.material)) return 1.0f;
     return power_heuristic(path.density, scene_.lights.density_of_triangle(path.position, path.light_normal, point));
+  }
+
+  /// Russian roulette, before the next ray is traced: what it would cost is what is to be saved.
+  static bool survives(PathState& path, float u) {
+    const float p = survival(path.throughput, path.context.depth, kStraight ? path.context.transparent_depth : 0);
+    if (p >= 1.0f) return true;
+    path.throughput /= p;
+    return u < p;
   }
 
   template <class Visitor>
