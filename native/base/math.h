@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
@@ -26,7 +27,7 @@ inline constexpr float kInvPi = 1.0f / kPi;
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 inline constexpr uint32_t kNone = 0xffffffffu;
 
-inline float max_component(const Vec3& v) { return std::fmax(v.x, std::fmax(v.y, v.z)); }
+inline float max_component(const Vec3& v) { return glm::max(v.x, glm::max(v.y, v.z)); }  // fmax would be a call
 inline float luminance(const Rgb& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 inline bool is_black(const Rgb& c) { return !(c.x > 0.0f || c.y > 0.0f || c.z > 0.0f); }
 inline bool is_finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }

@@ -354,8 +354,7 @@ Program Emitter::lower() {
     instruction.out2 = take(draft.out[1]);
     for (const uint32_t r : ends[k]) free.push_back(place[r]);
     if (reads_hit(draft.op)) program.effects |= kTextures;
-    program.reads_uv |=
-        reads_hit(draft.op) || draft.op == Op::kGlossy || draft.op == Op::kMetallic || draft.op == Op::kPrincipled;
+    program.reads_uv |= draft.op == Op::kUv;
     if (draft.op >= Op::kFirstClosure) program.empty = false;
     program.code.push_back(instruction);
   }

@@ -12,14 +12,19 @@ constexpr float kEpsilon = 0x1p-24f;   // half a unit in the last place of 1
 constexpr float kRoundings = 16.0f;    // that may meet in a position, counted generously
 constexpr float kLeastCosine = 1e-3f;  // between shading normal and outgoing direction
 
-/// Normalised, or zero where there is no direction to speak of.
-Vec3 unit_or_zero(const Vec3& v) {
+/// Squares of very small and very large vectors leave the range: the slow way.
+[[gnu::cold, gnu::noinline]] Vec3 extreme_unit_or_zero(const Vec3& v) {
   const float largest = std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
   if (!(largest > 0.0f) || !std::isfinite(largest)) return Vec3(0.0f);
+  const Vec3 scaled = v / largest;
+  return scaled / glm::length(scaled);
+}
+
+/// Normalised, or zero where there is no direction to speak of.
+inline Vec3 unit_or_zero(const Vec3& v) {
   const float length2 = glm::dot(v, v);
   if (length2 > 1e-30f && length2 < 1e30f) return v * (1.0f / std::sqrt(length2));
-  const Vec3 scaled = v / largest;  // squares of very small and very large vectors leave the range
-  return scaled / glm::length(scaled);
+  return extreme_unit_or_zero(v);
 }
 
 Vec3 face_normal(const Vec3& a, const Vec3& b) {
@@ -95,7 +100,8 @@ SurfacePoint surface_point(const Scene& scene, const Ray& ray, const Hit& hit, b
   const Vec3 bound = glm::abs(m.x) * terms.x + glm::abs(m.y) * terms.y + glm::abs(m.z) * terms.z + glm::abs(m.p) +
                      glm::abs(point.position);
   // The next ray's own test rounds relative to its triangle's size, even where the plane is exact (z = 0).
-  const float size = std::sqrt(std::fmax(glm::dot(m.vector(e1), m.vector(e1)), glm::dot(m.vector(e2), m.vector(e2))));
+  const Vec3 edges = glm::max(glm::abs(m.vector(e1)), glm::abs(m.vector(e2)));
+  const float size = std::max(edges.x, std::max(edges.y, edges.z));
   point.error = kRoundings * kEpsilon * (glm::dot(glm::abs(point.face_normal), bound) + 0.25f * size);
 
   point.backfacing = glm::dot(point.face_normal, ray.direction) > 0.0f;
@@ -112,6 +118,10 @@ SurfacePoint surface_point(const Scene& scene, const Ray& ray, const Hit& hit, b
   point.material = scene.material_slots()[record.first_material + slot];
   if (with_uv) point.uv = active_uv(mesh, point);
   return point;
+}
+
+Vec2 surface_uv(const Scene& scene, const SurfacePoint& point) {
+  return active_uv(*scene.instances()[point.instance].mesh, point);
 }
 
 Vec3 offset_origin(const SurfacePoint& point, const Vec3& direction) {

@@ -79,7 +79,7 @@ inline bool count_bounce(PathContext& c, const WalkLimits& limits, LobeClass pas
 /// the loss.
 inline float survival(const Rgb& throughput, uint32_t depth, uint32_t transparent_depth) {
   if (depth <= 1 && transparent_depth <= 1) return 1.0f;
-  return std::fmin(1.0f, std::sqrt(max_component(throughput)));
+  return glm::min(1.0f, std::sqrt(max_component(throughput)));
 }
 
 /// Weight of a sample drawn with density a, when the other strategy would have drawn it with b (Veach 1995, power 2).

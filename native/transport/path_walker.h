@@ -26,7 +26,7 @@ struct WalkScene {
   const CommittedScene& scene;
   WalkLimits limits;
   const InstanceMask* shown = nullptr;  // local view; null: everything
-  bool with_uv = true;                  // somebody looks at SurfacePoint::uv
+  bool with_uv = false;                 // of every point, not only where a material's program reads it
   bool shows(uint32_t instance) const { return !shown || ((*shown)[instance / 64] >> (instance % 64) & 1); }
 };
 
@@ -35,8 +35,8 @@ Rgb transmittance(const WalkScene&, Ray, const PathContext&, RayCounts&);
 
 /// End of a shadow ray: a little before its light, which may be a surface itself.
 inline float shadow_end(const Vec3& origin, float distance) {
-  const float reach = std::fmax(std::fabs(origin.x), std::fmax(std::fabs(origin.y), std::fabs(origin.z)));
-  return std::isfinite(distance) ? std::fmax(0.0f, distance * (1.0f - 2e-5f) - 1e-6f * reach) : distance;
+  const float reach = max_component(glm::abs(origin));
+  return std::isfinite(distance) ? glm::max(0.0f, distance * (1.0f - 2e-5f) - 1e-6f * reach) : distance;
 }
 
 template <uint32_t kFeatures>
@@ -110,7 +110,9 @@ class Walker {
   }
 
   SurfacePoint point_at(const PathState& path, const Hit& hit) const {
-    return surface_point(scene_.scene, path.ray, hit, walk_.with_uv);
+    SurfacePoint point = surface_point(scene_.scene, path.ray, hit, walk_.with_uv);
+    if (!walk_.with_uv && scene_.materials.reads_uv(point.material)) point.uv = surface_uv(scene_.scene, point);
+    return point;
   }
 
   float emission_weight(const PathState& path, const SurfacePoint& point) const {

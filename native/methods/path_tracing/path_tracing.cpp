@@ -57,7 +57,7 @@ class PathTracing final : public IndirectMethod {
 
   void render(const CommittedScene& scene, std::span<const PixelRequest> requests, Film& film, Work& work) override {
     const CameraRays camera(scene.scene.camera(), scene.scene.origin(), film.settings().width, film.settings().height);
-    const bool with_uv = scene.effects.has(kTextures) || film.layout()[Pass::kUv] >= 0;
+    const bool with_uv = film.layout()[Pass::kUv] >= 0;
     const KernelInput input{.walk = {scene, limits_, work.shown, with_uv},
                             .camera = camera,
                             .film = film,
