@@ -2,7 +2,10 @@
 // Session and the methods about themselves, as Python sees them. No logic: values, arrays, the GIL, exceptions.
 #include <pybind11/stl.h>
 
+#include <shared_mutex>
+
 #include "module/bindings.h"
+#include "render/record_rays.h"
 #include "render/session.h"
 
 namespace afterglow {
@@ -175,6 +178,40 @@ py::list descriptions() {
   return all;
 }
 
+py::dict record(const PyScene& scene, const py::object& settings, size_t most) {
+  RenderSettings render;
+  render.apply(named_values(settings));
+  RecordedRays rays;
+  {
+    const py::gil_scoped_release free;
+    const std::shared_lock use(scene.core->use);
+    rays = record_rays(*scene.core, render, most);
+  }
+  const DVec3 origin = scene.core->scene.origin();
+  const auto table = [](size_t rows) { return py::array_t<double>({py::ssize_t(rows), py::ssize_t(3)}); };
+  const auto fill = [&](const std::vector<Ray>& from, auto&& second, py::array_t<double>& a, py::array_t<double>& b) {
+    for (size_t i = 0; i < from.size(); ++i) {
+      const DVec3 start = DVec3(from[i].origin) + origin, other = second(from[i], start);
+      for (int c = 0; c < 3; ++c)
+        a.mutable_at(py::ssize_t(i), c) = start[c], b.mutable_at(py::ssize_t(i), c) = other[c];
+    }
+  };
+  py::array_t<double> origins = table(rays.closest.size()), directions = table(rays.closest.size()),
+                      starts = table(rays.occlusion.size()), targets = table(rays.occlusion.size());
+  fill(
+      rays.closest, [](const Ray& r, const DVec3&) { return DVec3(r.direction); }, origins, directions);
+  fill(
+      rays.occlusion,
+      [](const Ray& r, const DVec3& start) {
+        return start + DVec3(r.direction) * (std::isfinite(r.t_max) ? double(r.t_max) : 1e6);
+      },
+      starts, targets);
+  py::dict d;
+  d["closest_origins"] = origins, d["closest_directions"] = directions;
+  d["occluded_origins"] = starts, d["occluded_targets"] = targets;
+  return d;
+}
+
 /// Waits in slices, so that Ctrl-C is heard.
 bool wait(PySession& session, double timeout) {
   for (double left = timeout;; left -= 0.1) {
@@ -232,6 +269,7 @@ void bind_session(py::module_& m) {
       .def("read", &read, py::arg("name") = "combined", py::arg("out") = py::none())
       .def("statistics", &statistics);
   m.def("method_descriptions", &descriptions);
+  m.def("record_rays", &record, py::arg("scene"), py::arg("settings") = py::dict(), py::arg("most") = size_t(500'000));
   bind_denoise(m);
 }
 

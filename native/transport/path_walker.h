@@ -53,6 +53,7 @@ class Walker {
     counts_.camera++;
     for (uint32_t vertex = 0;; ++vertex) {
       Hit hit;
+      visitor.traced(path.ray, false);
       if (!closest(path, hit)) {
         if constexpr (kShapes) run_into_shapes(path, kInfinity, visitor);
         escape(path, visitor);
@@ -224,6 +225,7 @@ class Walker {
       ray.t_max = shadow_end(ray.origin, light.distance);
       ray.mask = kVisibleShadow;
       counts_.shadow++;
+      visitor.traced(ray, true);
       if constexpr (kStraight) {
         arriving *= transmittance(walk_, ray, path.context, counts_);
         if (is_black(arriving)) return;

@@ -247,6 +247,9 @@ def light_sample(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.fl
 def light_density(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32], direction: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
     """What rays meet, as a surface's own samples would: distance, radiance (N, 3), and the density with which light_sample
     chooses the same direction on what was met (nearest light or surface; else suns and world together)."""
+def record_rays(scene: Scene, settings: Mapping[str, Any] = ..., most: int = 500_000) -> dict[str, NDArray[np.float64]]:
+    """The rays that a render with these settings traces, spread over the image, for measure_rays: closest_origins,
+    closest_directions, occluded_origins, occluded_targets, each (N, 3), world space."""
 def measure_rays(scene: Scene, origins: NDArray[np.float64], directions: NDArray[np.float64], kind: str = "closest",
                  rounds: int = 8) -> dict[str, Any]:
     """Seconds of all rays on one thread, through native/rays (wrapped) and by bare Embree calls (bare), in alternating

@@ -302,3 +302,13 @@ def test_missing_denoiser_is_a_warning_not_a_failure() -> None:
         assert s.statistics()["denoiser"]
     else:
         assert any("not denoised" in w for w in s.statistics()["warnings"])
+
+
+def test_recorded_rays_are_those_of_the_render() -> None:
+    built, _ = session()
+    rays = afterglow._native.record_rays(built.scene, {"width": 64, "height": 64}, 20_000)
+    assert 4096 <= len(rays["closest_origins"]) <= 20_000 and len(rays["occluded_origins"]) > 1000
+    np.testing.assert_allclose(np.linalg.norm(rays["closest_directions"], axis=1), 1.0, rtol=1e-5)
+    hit = built.scene.intersect(rays["closest_origins"], rays["closest_directions"])
+    assert 0.3 < np.isfinite(hit["distance"]).mean() < 1.0
+    assert 0.05 < built.scene.occluded(rays["occluded_origins"], rays["occluded_targets"]).mean() < 0.95

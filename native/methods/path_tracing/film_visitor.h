@@ -97,6 +97,8 @@ class FilmVisitor {
     }
   }
 
+  void traced(const Ray&, bool) {}
+
   void held_out(const PathState& path, float share) {
     transparent_ += share * (path.throughput.x + path.throughput.y + path.throughput.z) / 3.0f;
   }
