@@ -19,8 +19,9 @@ bool is_delta(const Lobe& lobe) {
 }
 
 Vec3 cosine_sample(const Vec2& u) {
-  const float r = std::sqrt(u.x), phi = 2.0f * kPi * u.y;
-  return {r * std::cos(phi), r * std::sin(phi), std::sqrt(std::fmax(0.0f, 1.0f - u.x))};
+  const float r = std::sqrt(u.x);
+  const Vec2 around = sincos_turns(u.y);
+  return {r * around.y, r * around.x, std::sqrt(std::fmax(0.0f, 1.0f - u.x))};
 }
 
 /// Normals that do not bend with the surface let light in at angles where the surface itself is turned away: the smooth
