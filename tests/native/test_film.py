@@ -75,7 +75,7 @@ def test_samples_in_passes_equal_samples_at_once() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scene", "samples"), [("cornell_box", 256), ("cornell_emissive", 256), ("cornell_glossy", 512)])
+@pytest.mark.parametrize(("scene", "samples"), [("cornell_box", 256), ("cornell_textured", 256), ("cornell_statue", 1024)])
 def test_intervals_cover_the_truth(scene: str, samples: int) -> None:
     """95 % intervals of Student's t over sixteen batches hold the truth in 93–97 % of all pixels and seeds."""
     size, truth_seeds = 16, 8
