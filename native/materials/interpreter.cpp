@@ -125,8 +125,9 @@ Rgb hue_saturation(float hue, float saturation, float value, float factor, const
 Rgb checker(const Vec3& p, const Rgb& a, const Rgb& b, bool& first) {
   // An offset keeps whole numbers, where faces of cubes lie, from flickering.
   const Vec3 q = (p + 0.000001f) * 0.999999f;
-  const int sum = std::abs(int(std::floor(q.x))) + std::abs(int(std::floor(q.y))) + std::abs(int(std::floor(q.z)));
-  first = (sum & 1) != 0;
+  const auto parity = [](float v) { return std::fabs(v) < 1e9f ? uint32_t(int32_t(std::floor(v))) : 0u; };
+  const uint32_t sum = parity(q.x) + parity(q.y) + parity(q.z);
+  first = (sum & 1u) != 0;
   return first ? a : b;
 }
 
