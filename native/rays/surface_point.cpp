@@ -60,6 +60,11 @@ Vec3 keep_visible(const Vec3& n, const Vec3& outgoing) {
   return glm::normalize(n + (kLeastCosine - cosine) * 1.01f * outgoing);
 }
 
+uint32_t material_of(const Scene& scene, const InstanceRecord& record, uint32_t triangle) {
+  const uint32_t slot = record.mesh->slots.empty() ? 0 : record.mesh->slots[triangle];
+  return scene.material_slots()[record.first_material + std::min(slot, record.slot_count - 1)];
+}
+
 Vec2 active_uv(const Mesh& mesh, const SurfacePoint& at) {
   if (mesh.active_uv >= mesh.uvs.size()) return Vec2(0.0f);
   const std::vector<Vec2>& values = mesh.uvs[mesh.active_uv].values;
@@ -113,15 +118,17 @@ SurfacePoint surface_point(const Scene& scene, const Ray& ray, const Hit& hit, b
   }
   point.normal = keep_visible(point.normal, point.outgoing);
 
-  uint32_t slot = mesh.slots.empty() ? 0 : mesh.slots[hit.triangle];
-  slot = std::min(slot, record.slot_count - 1);
-  point.material = scene.material_slots()[record.first_material + slot];
+  point.material = material_of(scene, record, hit.triangle);
   if (with_uv) point.uv = active_uv(mesh, point);
   return point;
 }
 
 Vec2 surface_uv(const Scene& scene, const SurfacePoint& point) {
   return active_uv(*scene.instances()[point.instance].mesh, point);
+}
+
+uint32_t material_at(const Scene& scene, const Hit& hit) {
+  return material_of(scene, scene.instances()[hit.instance], hit.triangle);
 }
 
 Vec3 offset_origin(const SurfacePoint& point, const Vec3& direction) {

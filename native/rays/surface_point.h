@@ -27,6 +27,9 @@ SurfacePoint surface_point(const Scene&, const Ray&, const Hit&, bool with_uv);
 /// The active UV map at a hit, for those who learn only from the point's material that they want it.
 Vec2 surface_uv(const Scene&, const SurfacePoint&);
 
+/// The dense material index at a hit, without the facts that cost more.
+uint32_t material_at(const Scene&, const Hit&);
+
 /// A ray's start beyond self-intersection on the side that `direction` leaves to. The error bound covers the transform.
 Vec3 offset_origin(const SurfacePoint&, const Vec3& direction);
 

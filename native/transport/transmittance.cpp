@@ -12,9 +12,10 @@ Rgb transmittance(const WalkScene& walk, Ray ray, const PathContext& from, RayCo
   for (;;) {
     Hit hit;
     if (!scene.rays.closest(ray, hit)) return through;
+    const bool shown = walk.shows(hit.instance);
+    if (shown && scene.materials.opaque(material_at(scene.scene, hit))) return Rgb(0.0f);
     SurfacePoint point = surface_point(scene.scene, ray, hit, false);
-    if (walk.shows(hit.instance)) {
-      if (scene.materials.opaque(point.material)) return Rgb(0.0f);
+    if (shown) {
       if (scene.materials.reads_uv(point.material)) point.uv = surface_uv(scene.scene, point);
       context.ray_length = hit.t;
       through *= scene.materials.transparency(scene.scene, point, context);
