@@ -22,7 +22,7 @@ const char* state_name(SessionState state) {
 }
 
 Session::Session(std::shared_ptr<const CommittedScene> scene, RenderSettings settings)
-    : scene_(std::move(scene)), settings_(std::move(settings)) {}
+    : scene_(std::move(scene)), settings_(std::move(settings)), shown_settings_(settings_) {}
 
 Session::~Session() { stop_thread(); }
 
@@ -42,6 +42,7 @@ void Session::launch() {
   {
     const std::lock_guard lock(mutex_);
     state_ = paused_ ? SessionState::kPaused : SessionState::kRunning;
+    shown_settings_ = settings_;
     failure_ = nullptr;
     failure_text_.clear();
     stage_ = "preparing";
@@ -156,10 +157,11 @@ SessionProgress Session::progress() const {
   if (film_) {
     const FilmSettings& f = film_->settings();
     const double pixels = double(f.x1 - f.x0) * double(f.y1 - f.y0);
-    p.fraction = std::min(1.0, double(done) / std::max(1.0, pixels * settings_.samples));
-    if (settings_.accuracy > 0.0f && p.error > 0.0)  // the error's square falls with the samples
-      p.fraction = std::max(p.fraction, std::min(1.0, std::pow(settings_.accuracy / p.error, 2.0)));
-    if (settings_.time_limit > 0.0f) p.fraction = std::max(p.fraction, std::min(1.0, p.elapsed / settings_.time_limit));
+    p.fraction = std::min(1.0, double(done) / std::max(1.0, pixels * shown_settings_.samples));
+    if (shown_settings_.accuracy > 0.0f && p.error > 0.0)  // the error's square falls with the samples
+      p.fraction = std::max(p.fraction, std::min(1.0, std::pow(shown_settings_.accuracy / p.error, 2.0)));
+    if (shown_settings_.time_limit > 0.0f)
+      p.fraction = std::max(p.fraction, std::min(1.0, p.elapsed / shown_settings_.time_limit));
     if (p.fraction > 0.0 && state_ == SessionState::kRunning) p.remaining = p.elapsed / p.fraction - p.elapsed;
   }
   if (state_ == SessionState::kFinished) p.fraction = 1.0, p.remaining = 0.0;
@@ -182,13 +184,13 @@ std::pair<uint32_t, uint32_t> Session::size() const {
   const std::lock_guard lock(mutex_);
   if (shown_) return {shown_->width, shown_->height};
   if (film_) return {film_->width(), film_->height()};
-  const FilmSettings film = completed(settings_.film);
+  const FilmSettings film = completed(shown_settings_.film);
   return {film.x1 - film.x0, film.y1 - film.y0};
 }
 
 PassSet Session::passes() const {
   const std::lock_guard lock(mutex_);
-  return (film_ ? film_->settings().passes : settings_.film.passes) | kAlwaysKept;
+  return (film_ ? film_->settings().passes : shown_settings_.film.passes) | kAlwaysKept;
 }
 
 void Session::read(Pass pass, std::vector<float>& out, uint32_t& width, uint32_t& height) const {
@@ -201,7 +203,8 @@ void Session::read(Pass pass, std::vector<float>& out, uint32_t& width, uint32_t
       width = shown_->width, height = shown_->height;
       return;
     }
-    film = film_;
+    // A viewport shows whole images only: until the first, nothing.
+    if (!(pass == Pass::kCombined && shown_settings_.viewport)) film = film_;
     step = film_step_;
   }
   if (!film) {

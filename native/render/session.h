@@ -100,12 +100,13 @@ class Session {
   mutable std::mutex mutex_;  // all below
   mutable std::condition_variable changed_;
   SessionState state_ = SessionState::kIdle;
+  RenderSettings shown_settings_;  // what readers are told about: those of the last start
   std::exception_ptr failure_;
   std::string failure_text_, stage_;
   std::shared_ptr<Film> film_;
   std::shared_ptr<const Image> shown_;  // null: read the film
   uint32_t film_step_ = 1;
-  uint64_t generation_ = 0;
+  mutable uint64_t generation_ = 0;
   mutable uint64_t generation_at_ = 0;
   SessionStatistics statistics_;
   double started_ = 0.0, ended_ = 0.0;
