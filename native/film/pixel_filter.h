@@ -12,7 +12,10 @@ namespace afterglow {
 
 enum class PixelFilterKind : uint8_t { kBox, kGaussian, kBlackmanHarris };
 
-/// The unnormalised filter at x pixels from the centre; width is that of the whole filter, in pixels.
+/// How far a filter of Blender's setting `filter_width` reaches from the centre, in pixels: the setting is about the
+/// width at half height. The box is always one pixel wide.
+float filter_radius(PixelFilterKind, float width);
+/// The unnormalised filter at x pixels from the centre.
 float filter_value(PixelFilterKind, float width, float x);
 
 class PixelFilter {
