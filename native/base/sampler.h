@@ -54,6 +54,12 @@ inline T laine_karras(T x, T seed) {
 
 /// The four first dimensions of the Sobol sequence for each value of each half byte of the index (Joe and Kuo 2008).
 using Table = std::array<std::array<std::array<uint32_t, 4>, 16>, 8>;
+constexpr uint32_t reversed_bits(uint32_t x) {
+  uint32_t r = 0;
+  for (int bit = 0; bit < 32; ++bit) r |= (x >> bit & 1u) << (31 - bit);
+  return r;
+}
+/// Kept with all bits reversed, values and half bytes: the scrambles on both sides work on reversed bits.
 constexpr Table make_table() {
   uint32_t v[4][32] = {};
   // Primitive polynomials x+1, x²+x+1, x³+x+1 with their first direction numbers; dimension 0 is van der Corput's.
@@ -75,7 +81,8 @@ constexpr Table make_table() {
     for (int value = 0; value < 16; ++value)
       for (int d = 0; d < 4; ++d)
         for (int bit = 0; bit < 4; ++bit)
-          if (value >> bit & 1) table[size_t(part)][size_t(value)][size_t(d)] ^= v[d][4 * part + bit];
+          if (value >> (3 - bit) & 1)
+            table[size_t(part)][size_t(value)][size_t(d)] ^= reversed_bits(v[d][4 * part + bit]);
   return table;
 }
 alignas(64) inline constexpr Table kTable = make_table();
@@ -85,15 +92,15 @@ inline Lanes load(const std::array<uint32_t, 4>& a) { return Lanes{a[0], a[1], a
 /// The four coordinates of one block, as 32-bit fractions.
 inline Lanes block(uint32_t seed, uint32_t reversed_index, uint32_t block) {
   const uint32_t key = hash(seed ^ (block * 0x9e3779b9u));
-  const uint32_t i = reverse(laine_karras(reversed_index, key));
-  Lanes x = load(kTable[0][i & 15]);
+  const uint32_t i = laine_karras(reversed_index, key);  // reversed, too: the lowest bits of the index stand on top
+  Lanes x = load(kTable[0][i >> 28]);
   // 24 bits of the index tell 16 million points apart; what digits beyond would change, the scramble does anyway.
-  for (unsigned part = 1; part < 6; ++part) x ^= load(kTable[part][i >> (4 * part) & 15]);
+  for (unsigned part = 1; part < 6; ++part) x ^= load(kTable[part][i >> (28 - 4 * part) & 15]);
   Lanes keys = Lanes{0x68bc21ebu, 0x02e5be93u, 0x967a889bu, 0xb5297a4du} ^ key;  // one scramble a dimension
   keys = (keys ^ (keys >> 16)) * 0x21f0aaadu;
   keys = (keys ^ (keys >> 15)) * 0xd35a2d97u;
   keys ^= keys >> 15;
-  return reverse(laine_karras(reverse(x), keys));
+  return reverse(laine_karras(x, keys));
 }
 
 }  // namespace sobol

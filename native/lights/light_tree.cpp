@@ -127,6 +127,12 @@ void LightTree::Columns::fill(std::span<const LightBounds> lights) {
 
 namespace {
 
+/// Whether all of a box lies below the plane through the point; never for normal 0.
+bool behind(const Box& box, const Vec3& position, const Vec3& normal) {
+  const Vec3 center = box.center() - position, half = box.upper - box.center();
+  return glm::dot(center, normal) + glm::dot(half, glm::abs(normal)) < 0.0f;
+}
+
 using Eight = float __attribute__((vector_size(32)));  // the compiler splits it where registers are narrower
 using EightBits = int32_t __attribute__((vector_size(32)));
 
@@ -279,6 +285,10 @@ float LightTree::importance(const Vec3& position, const Vec3& normal) const {
 
 uint32_t LightTree::sample(const Vec3& position, const Vec3& normal, float u, float& probability) const {
   if (nodes_.empty()) return kNone;
+  if (lights_.size() == 1) {  // nothing to choose from
+    probability = 1.0f;
+    return behind(lights_[0].box, position, normal) ? kNone : order_[0];
+  }
   const Node* node = &nodes_[0];
   probability = 1.0f;
   while (node->count == 0) {
@@ -309,6 +319,7 @@ uint32_t LightTree::sample(const Vec3& position, const Vec3& normal, float u, fl
 }
 
 float LightTree::probability(uint32_t light, const Vec3& position, const Vec3& normal) const {
+  if (lights_.size() == 1) return behind(lights_[0].box, position, normal) ? 0.0f : 1.0f;
   const uint32_t place = place_[light];
   uint32_t node = leaf_[place];
   Weights weights;
