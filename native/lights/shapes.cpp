@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "materials/microfacet.h"
+
 namespace afterglow {
 
 namespace {
@@ -96,9 +98,9 @@ RectangleView::RectangleView(const Vec3& from, const Vec3& corner, const Vec3& e
 }
 
 Vec2 RectangleView::sample(const Vec2& u) const {
-  const float au = u.x * solid_angle_ + k_;
-  const float sine = std::sin(au);
-  const float fu = (std::cos(au) * b0_ - b1_) / (std::fabs(sine) > 1e-12f ? sine : 1e-12f);
+  const Vec2 around = sincos_turns((u.x * solid_angle_ + k_) * (0.5f * kInvPi));
+  const float sine = around.x;
+  const float fu = (around.y * b0_ - b1_) / (std::fabs(sine) > 1e-12f ? sine : 1e-12f);
   const float cu = std::clamp(std::copysign(1.0f / std::sqrt(fu * fu + b0_ * b0_), fu), -1.0f, 1.0f);
   const float xu = std::clamp(-(cu * z0_) / std::max(safe_sqrt(1.0f - cu * cu), 1e-7f), x0_, x1_);
   const float d = std::sqrt(xu * xu + z0_ * z0_);
