@@ -72,7 +72,7 @@ def test_data_of_the_first_surface() -> None:
 
 @pytest.mark.parametrize(("falloff", "power"), [("quadratic", 2.0), ("linear", 1.0), ("inverse_quadratic", 0.5)])
 def test_mist_falloffs(falloff: str, power: float) -> None:
-    r = render(plane(), size=16, samples=4, passes=["mist"], mist=(0.0, 8.0, falloff))
+    r = render(plane(), size=16, samples=4, passes=["mist"], mist=(0.0, 8.0, falloff), pixel_filter="BOX")
     assert r.passes["mist"][8, 7, 0] == pytest.approx(0.5**power, abs=0.02)
 
 
