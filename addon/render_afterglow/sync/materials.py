@@ -14,11 +14,33 @@ from .lights import uses_nodes
 from .nodes import Context, Graph, compile_tree, names_of_attributes, solid_graph
 
 DEFAULT = 0  # the key of Blender's default surface: an empty slot
+HOLLOW = 1   # added to an address, which is even: the variant of a material for points, invisible from inside
 
 
 def digest(value: Any) -> bytes:
     """Equal for equal graphs and arguments; arrays by content."""
     return pickle.dumps(value, protocol=5)
+
+
+def default_graph() -> Graph:
+    """Blender's surface for an empty slot: grey and diffuse, since 5.0 the Principled BSDF as it comes."""
+    if bpy.app.version < (5, 0, 0):
+        return solid_graph("diffuse_bsdf", (0.8, 0.8, 0.8))
+    node = {"type": "principled", "name": "", "params": {"distribution": "multi_ggx", "version": 2},
+            "inputs": {"base_color": (0.8, 0.8, 0.8), "roughness": 0.5, "ior": 1.5}}
+    return {"nodes": [node], "surface": ("link", 0, "shader")}
+
+
+def hollow_graph(graph: Graph) -> Graph:
+    """The same from outside, nothing from inside: Blender's points are spheres that a ray leaves unseen."""
+    if graph["surface"] is None:
+        return graph
+    first = len(graph["nodes"])
+    nodes = [*graph["nodes"], {"type": "geometry", "name": "", "params": {}, "inputs": {}},
+             {"type": "transparent_bsdf", "name": "", "params": {}, "inputs": {"color": (1.0, 1.0, 1.0)}},
+             {"type": "mix_shader", "name": "", "params": {}, "inputs": {
+                 "fac": ("link", first, "backfacing"), "shader": graph["surface"], "shader_001": ("link", first + 1, "shader")}}]
+    return {"nodes": nodes, "surface": ("link", first + 2, "shader")}
 
 
 @dataclass
@@ -63,9 +85,9 @@ class MaterialTable:
         if not self._everything and not self._dirty and not self.moving:
             return
         for original in bpy.data.materials:
-            address = original.as_pointer()
-            if address in self.table and (self._everything or address in self._dirty or address in self.moving):
-                self._compile(address, original.evaluated_get(depsgraph), "")
+            for address in (original.as_pointer(), original.as_pointer() + HOLLOW):
+                if address in self.table and (self._everything or original.as_pointer() in self._dirty or address in self.moving):
+                    self._compile(address, original.evaluated_get(depsgraph), "")
 
     def end(self, used: set[int], used_images: set[int], report: Any) -> None:
         """Removes what nothing uses any more."""
@@ -83,11 +105,12 @@ class MaterialTable:
 
     # -- materials
 
-    def handle(self, material: Any, user: str) -> tuple[int, int]:
+    def handle(self, material: Any, user: str, hollow: bool = False) -> tuple[int, int]:
         """(key, handle) of an evaluated material, None for an empty slot. user: an object for warnings."""
-        address = DEFAULT if material is None else material.original.as_pointer()
+        original = DEFAULT if material is None else material.original.as_pointer()
+        address = original + (HOLLOW if hollow else 0)
         known = self.table.get(address)
-        if known is None or (address not in self._fresh and (self._everything or address in self._dirty)):
+        if known is None or (address not in self._fresh and (self._everything or original in self._dirty)):
             known = self._compile(address, material, user)
         return address, known.handle
 
@@ -95,6 +118,8 @@ class MaterialTable:
         self._fresh.add(address)
         self._reads_matrix = False
         graph, arguments = self._read(material, user)
+        if address & HOLLOW:
+            graph = hollow_graph(graph)
         (self.moving.add if self._reads_matrix else self.moving.discard)(address)
         key, known = digest((graph, arguments)), self.table.get(address)
         if known is not None and known.key == key:
@@ -113,7 +138,7 @@ class MaterialTable:
 
     def _read(self, material: Any, user: str) -> tuple[Graph, dict[str, Any]]:
         if material is None:
-            return solid_graph("diffuse_bsdf", (0.8, 0.8, 0.8)), {"name": "Default Surface"}
+            return default_graph(), {"name": "Default Surface"}
         context = self.context(f"Material '{material.name}'" + (f" (object '{user}')" if user else ""))
         if uses_nodes(material):
             try:

@@ -80,12 +80,13 @@ def _read_smooth(mesh: Any) -> NDArray[Any]:
 
 
 def _read_normals(mesh: Any) -> dict[str, Any]:
-    smooth = _read_smooth(mesh)
+    """Corner normals speak for themselves: with them, flat faces are smooth ones with equal normals."""
     if hasattr(mesh, "normals_domain"):  # since 4.1 the mesh itself knows how much its normals hold
         split = mesh.normals_domain == "CORNER"
     else:
         split = mesh.use_auto_smooth
     if not split:
+        smooth = _read_smooth(mesh)
         if not smooth.any():
             return {"smooth": smooth}
         return {"smooth": smooth, "vertex_normals": read(mesh.vertex_normals, "vector", np.float32, 3)}
@@ -96,7 +97,7 @@ def _read_normals(mesh: Any) -> dict[str, Any]:
         mesh.free_normals_split()
     else:
         normals = read(mesh.corner_normals, "vector", np.float32, 3)
-    return {"smooth": smooth, "corner_normals": normals}
+    return {"corner_normals": normals}
 
 
 def _read_uvs(mesh: Any) -> tuple[dict[str, NDArray[Any]], str]:

@@ -194,7 +194,7 @@ class ObjectTable:
             group.address = data.as_pointer()
         else:
             self._warn_of(ob)
-            pairs = [self.materials.handle(material, ob.name) for material in self._slots(ob, data)]
+            pairs = [self.materials.handle(material, ob.name, use.is_points) for material in self._slots(ob, data)]
             parent = instance.parent if instance.is_instance else None
             bits, holdout, catcher = object_visibility(ob, parent, self.layer)
             properties = {"name": ob.name, "materials": tuple(handle for _, handle in pairs), "object_index": ob.pass_index,

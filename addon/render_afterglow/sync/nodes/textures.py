@@ -76,6 +76,13 @@ def environment_texture_node(compiler: Compiler, view: NodeView) -> Outputs:
                                    mapping=texture_mapping(node))}
 
 
+def param_of(value: Any) -> Any:
+    """A node's property as a parameter: words in lower case, vectors as plain tuples."""
+    if isinstance(value, str):
+        return value.lower()
+    return value if isinstance(value, (bool, int, float)) else tuple(value)
+
+
 def procedural(kind: str, params: dict[str, str]) -> Any:
     """params: native name → the node's property; values in lower case, numbers as they are."""
     def rule(compiler: Compiler, view: NodeView) -> Outputs:
@@ -83,7 +90,7 @@ def procedural(kind: str, params: dict[str, str]) -> Any:
         given = {snake(name): value for name, value in view.inputs()}
         values = {native: getattr(node, name) for native, name in params.items() if hasattr(node, name)}
         index = compiler.add(kind, node.name, given, mapping=texture_mapping(node),
-                             **{key: value.lower() if isinstance(value, str) else value for key, value in values.items()})
+                             **{key: param_of(value) for key, value in values.items()})
         return {socket.identifier: ("link", index, snake(socket.identifier)) for socket in node.outputs}
     return rule
 
