@@ -2,10 +2,11 @@
 // Finds and loads OpenImageDenoise (see oidn.h).
 #include "film/oidn.h"
 
+#include <dirent.h>
 #include <dlfcn.h>
+#include <sys/stat.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <mutex>
@@ -32,11 +33,14 @@ void add_mapped(std::vector<std::string>& list) {
   }
 }
 
-void add_folder(std::vector<std::string>& list, const std::filesystem::path& folder) {
-  std::error_code ignored;
+// POSIX instead of std::filesystem, which the C++ library of Blender's oldest hosts (GCC 8) does not have.
+void add_folder(std::vector<std::string>& list, const std::string& folder) {
+  DIR* entries = opendir(folder.c_str());
+  if (!entries) return;
   std::vector<std::string> found;
-  for (std::filesystem::directory_iterator it(folder, ignored), end; it != end; it.increment(ignored))
-    if (is_library(it->path().filename().string())) found.push_back(it->path().string());
+  while (const dirent* entry = readdir(entries))
+    if (is_library(entry->d_name)) found.push_back(folder + "/" + entry->d_name);
+  closedir(entries);
   std::sort(found.begin(), found.end());
   for (const std::string& path : found) add(list, path);
 }
@@ -98,10 +102,11 @@ std::vector<std::string> oidn_candidates(const std::vector<std::string>& search)
   std::vector<std::string> list;
   add_mapped(list);
   for (const std::string& place : search) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(place, ignored))
+    struct stat what {};
+    if (stat(place.c_str(), &what) != 0) continue;
+    if (S_ISDIR(what.st_mode))
       add_folder(list, place);
-    else if (std::filesystem::is_regular_file(place, ignored))
+    else if (S_ISREG(what.st_mode))
       add(list, place);
   }
   for (const char* suffix : {".2", ".1", ".0", ""}) add(list, std::string(kPrefix) + suffix);
