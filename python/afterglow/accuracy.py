@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
@@ -21,7 +18,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from . import cache, chart, metrics, scenes
+from . import blenders, cache, chart, images, metrics, scenes
 
 PARTS = 8
 
@@ -100,67 +97,33 @@ class ProceduralRenderer:
 
 
 class BlenderRenderer:
-    """A .blend file, rendered by one Blender that stays open: commands go in as lines of JSON, answers come back."""
+    """A .blend file, rendered by one Blender that stays open; the file's own bounces and clamping count."""
 
-    def __init__(self, path: str | Path, percent: int = 100, blender: str | None = None) -> None:
+    def __init__(self, path: str | Path, percent: int = 100) -> None:
         path = Path(path).resolve()
         if not path.is_file():
             raise FileNotFoundError(f"there is no file {path}")
         self.name = path.stem
-        self.folder = tempfile.TemporaryDirectory(prefix="afterglow_")
-        program = blender or find_blender()
-        script = Path(__file__).with_name("blender_server.py")
-        environment = dict(os.environ, PYTHONUNBUFFERED="1")
-        self.process = subprocess.Popen(
-            [program, "-b", str(path), "--python-exit-code", "1", "--python", str(script), "--", self.folder.name, str(percent)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", env=environment)
-        hello = self._answer()
-        self.resolution = tuple(hello["resolution"])
-        self.key = {"scene": cache.file_key(path), "resolution": self.resolution, "frame": hello["frame"]}
-        self.in_use = hello.get("settings", {})
-
-    def _answer(self) -> dict[str, Any]:
-        assert self.process.stdout is not None
-        heard: list[str] = []
-        for line in self.process.stdout:
-            if line.startswith("AFTERGLOW_ANSWER "):
-                answer = json.loads(line.split(" ", 1)[1])
-                if "error" in answer:
-                    raise RuntimeError(answer["error"])
-                return answer
-            heard.append(line)
-        raise RuntimeError("Blender ended without an answer; its last words:\n" + "".join(heard[-25:]))
+        self.worker = blenders.Worker.of_debian()
+        try:
+            opened = self.worker.open(path, percent)
+            if opened["problem"]:
+                raise blenders.WorkerError(opened["problem"])
+        except BaseException:
+            self.worker.close()
+            raise
+        self.resolution = tuple(opened["resolution"])
+        self.key = {"scene": cache.file_key(path), "resolution": self.resolution, "frame": opened["frame"]}
+        self.in_use = opened["settings"]
 
     def render(self, **settings: Any) -> tuple[np.ndarray, float, dict[str, Any]]:
-        assert self.process.stdin is not None
-        self.process.stdin.write(json.dumps(settings) + "\n")
-        self.process.stdin.flush()
-        answer = self._answer()
-        from . import images
-
-        return images.read(answer["image"]), answer["seconds"], answer["statistics"]
+        answer = self.worker.render(as_references=False, **settings)
+        pixels = images.read(answer["image"])
+        Path(answer["image"]).unlink()
+        return pixels, answer["seconds"], answer["statistics"]
 
     def close(self) -> None:
-        if self.process.poll() is None and self.process.stdin is not None:
-            self.process.stdin.close()
-            try:
-                self.process.wait(20)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-        self.folder.cleanup()
-
-
-def find_blender() -> str:
-    """AFTERGLOW_BLENDER, or build/blender of the source tree that this package was built in."""
-    named = os.environ.get("AFTERGLOW_BLENDER")
-    if named:
-        return named
-    for parent in Path(__file__).resolve().parents:
-        if (parent / "build" / "blender").is_file():
-            return str(parent / "build" / "blender")
-        if parent.name == "build" and (parent / "blender").is_file():
-            return str(parent / "blender")
-    raise FileNotFoundError("build/blender is absent: run `make build`, or name a Blender with the add-on in AFTERGLOW_BLENDER")
+        self.worker.close()
 
 
 def open_renderer(file: str, percent: int = 100) -> Renderer:
@@ -306,7 +269,7 @@ def main(arguments: Any) -> int:
     try:
         report = run(arguments.file, percent=arguments.percent, samples=arguments.samples, repeats=arguments.repeats,
                      budget=arguments.budget, methods=arguments.method or None)
-    except (KeyError, FileNotFoundError) as error:
+    except (KeyError, FileNotFoundError, blenders.Unavailable, blenders.WorkerError) as error:
         print(f"afterglow accuracy: {error.args[0] if isinstance(error, KeyError) else error}", file=sys.stderr)
         return 2
     print(to_table(report))

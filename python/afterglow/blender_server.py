@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs inside Blender: renders the open file again and again with settings that come in as lines of JSON.
+"""Runs inside Blender (or in Python with the module `bpy`) and does jobs that come in as lines of JSON on standard input.
 
-blender -b FILE --python blender_server.py -- FOLDER PERCENT. Answers are lines that begin with AFTERGLOW_ANSWER. Started by
-`afterglow.accuracy`; needs the add-on enabled. A key that scene.afterglow has not is ignored but "error" names it.
+blender -b --python blender_server.py -- FD FOLDER: answers go to the file descriptor FD as lines of JSON, images to FOLDER.
+Jobs: {"op": "open", "file", "percent"}, {"op": "render", "engine", "settings", "multilayer", "out"}, {"op": "memory"},
+{"op": "grid", "triangles"}, {"op": "save", "file"}. Started by `afterglow.blenders`; what Blender prints stays on standard output.
 """
 
 import json
@@ -12,66 +13,178 @@ import time
 
 import bpy
 
+LIGHT_PASSES = ("diffuse_direct", "diffuse_indirect", "diffuse_color", "glossy_direct", "glossy_indirect", "glossy_color",
+                "transmission_direct", "transmission_indirect", "transmission_color", "emit", "environment")
+# The references' settings: nothing is clamped, no caustics, as many bounces for all.
+BOUNCES = ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces")
 
-def answer(values: dict) -> None:
-    print("AFTERGLOW_ANSWER " + json.dumps(values), flush=True)
+
+def enable_addon() -> str:
+    """Enables the add-on unless it is; returns why it could not be."""
+    if hasattr(bpy.types.Scene, "afterglow"):
+        return ""
+    import addon_utils
+
+    for name in ("bl_ext.user_default.afterglow", "render_afterglow"):
+        try:
+            if addon_utils.enable(name, default_set=True) is not None and hasattr(bpy.types.Scene, "afterglow"):
+                return ""
+        except Exception as error:
+            return f"{name}: {error}"
+    return "the add-on is not enabled in this Blender: start it through build/blender"
 
 
-def settings_of(scene: "bpy.types.Scene") -> dict:
-    own = scene.afterglow
+def open_file(job: dict) -> dict:
+    bpy.ops.wm.open_mainfile(filepath=job["file"], load_ui=False)
+    scene = bpy.context.scene
+    problem = enable_addon()
+    own = getattr(scene, "afterglow", None)
     names = ("method", "samples", "accuracy", "time_limit", "denoise")
-    return {name: getattr(own, name) for name in names if hasattr(own, name)}
+    in_use = {name: getattr(own, name) for name in names if hasattr(own, name)}
+    render = scene.render
+    render.resolution_percentage = max(1, round(render.resolution_percentage * job.get("percent", 100) / 100))
+    render.use_border = render.use_compositing = render.use_sequencer = False
+    share = render.resolution_percentage / 100
+    return {"resolution": [int(render.resolution_x * share), int(render.resolution_y * share)], "frame": scene.frame_current,
+            "settings": in_use, "problem": problem}
 
 
-def render(scene: "bpy.types.Scene", folder: str, number: int, settings: dict) -> dict:
-    own = scene.afterglow
+def apply(scene: "bpy.types.Scene", engine: str, settings: dict) -> None:
+    """Settings by the names of scene.afterglow; of Cycles those that it has, and its names of the others."""
+    scene.render.engine = engine
+    if engine == "AFTERGLOW":
+        own = scene.afterglow
+        # An unnamed setting keeps what the file says, but for these.
+        for name, value in {"time_limit": 0.0, "denoise": False, **settings}.items():
+            setattr(own, name, value)
+        return
+    cycles = scene.cycles
+    settings = dict(settings)
+    cycles.device = "CPU"
+    cycles.use_denoising = settings.pop("denoise", False)
+    if cycles.use_denoising:
+        cycles.denoiser = "OPENIMAGEDENOISE"
+    cycles.use_adaptive_sampling = False
+    cycles.blur_glossy = 0.0
+    threads = settings.pop("threads", 0)
+    scene.render.threads_mode = "FIXED" if threads else "AUTO"
+    if threads:
+        scene.render.threads = threads
+    for name in ("method", "accuracy", "time_limit"):
+        settings.pop(name, None)
     for name, value in settings.items():
-        if not hasattr(own, name):
-            raise AttributeError(f"the add-on has no setting {name!r}")
-        setattr(own, name, value)
-    path = os.path.join(folder, f"image_{number}.exr")
+        setattr(cycles, name, value)
+
+
+def render(job: dict, folder: str, number: int) -> dict:
+    scene = bpy.context.scene
+    settings = dict(job.get("settings", {}))
+    if job.get("as_references"):
+        settings = {**{name: 12 for name in BOUNCES}, "sample_clamp_direct": 0.0, "sample_clamp_indirect": 0.0,
+                    "caustics_reflective": False, "caustics_refractive": False, **settings}
+    engine = job.get("engine", "AFTERGLOW")
+    apply(scene, engine, settings)
+    layer = bpy.context.view_layer
+    for name in LIGHT_PASSES:
+        if hasattr(layer, "use_pass_" + name):
+            setattr(layer, "use_pass_" + name, bool(job.get("multilayer")))
+    image = scene.render.image_settings
+    kind = "OPEN_EXR_MULTILAYER" if job.get("multilayer") else "OPEN_EXR"
+    if hasattr(image, "media_type"):
+        image.media_type = "MULTI_LAYER_IMAGE" if job.get("multilayer") else "IMAGE"
+    image.file_format, image.color_depth = kind, "32"
+    if not job.get("multilayer"):
+        image.color_mode = "RGB"
+    path = job.get("out") or os.path.join(folder, f"image_{number}.exr")
+    scene.render.use_file_extension = False
     scene.render.filepath = path
     start = time.perf_counter()
     bpy.ops.render.render(write_still=True)
     seconds = time.perf_counter() - start
     statistics = {}
-    try:
+    if engine == "AFTERGLOW":
         import afterglow
 
-        statistics = afterglow.statistics(scene) or {}
-    except ImportError:
-        pass
+        statistics = {k: v for k, v in afterglow.statistics(scene).items() if k != "passes_log"}
     return {"image": path, "seconds": seconds, "statistics": statistics}
 
 
-def main() -> None:
-    folder, percent = sys.argv[sys.argv.index("--") + 1 :][:2]
+def memory() -> dict:
+    """Peak and present resident memory of this process in bytes."""
+    values = {}
+    with open("/proc/self/status") as file:
+        for line in file:
+            if line.startswith(("VmHWM", "VmRSS")):
+                values[line.split(":")[0]] = int(line.split()[1]) * 1024
+    return {"peak": values["VmHWM"], "now": values["VmRSS"]}
+
+
+def grid(job: dict) -> dict:
+    """An empty file with one smooth sheet of about that many triangles, with UVs, a camera and a sun."""
+    import numpy as np
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    enable_addon()
+    side = max(1, round((job["triangles"] / 2) ** 0.5))
+    y, x = np.mgrid[0 : side + 1, 0 : side + 1] / side * 2 - 1
+    points = np.stack([x, y, 0.1 * np.sin(9 * x) * np.cos(7 * y)], -1).astype(np.float32)
+    row, column = np.mgrid[0:side, 0:side]
+    first = (row * (side + 1) + column).ravel()
+    corners = np.stack([first, first + 1, first + side + 2, first + side + 1], -1).astype(np.int32)
+    mesh = bpy.data.meshes.new("Sheet")
+    mesh.vertices.add(points.size // 3)
+    mesh.vertices.foreach_set("co", points.ravel())
+    mesh.loops.add(corners.size)
+    mesh.loops.foreach_set("vertex_index", corners.ravel())
+    mesh.polygons.add(len(corners))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, corners.size, 4, dtype=np.int32))
+    mesh.polygons.foreach_set("loop_total", np.full(len(corners), 4, np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(corners), bool))
+    flat = points.reshape(-1, 3)[corners.ravel(), :2] / 2 + 0.5
+    mesh.uv_layers.new(name="UVMap").data.foreach_set("uv", np.ascontiguousarray(flat, np.float32).ravel())
+    material = bpy.data.materials.new("Sheet")
+    material.use_nodes = True
+    mesh.materials.append(material)
+    mesh.update(calc_edges=True)
     scene = bpy.context.scene
-    if not hasattr(scene, "afterglow"):
-        answer({"error": "the add-on is not enabled in this Blender: start it through build/blender"})
-        return
-    in_use = settings_of(scene)
-    scene.render.engine = "AFTERGLOW"
-    scene.render.resolution_percentage = int(percent) * scene.render.resolution_percentage // 100
-    scene.render.use_border = scene.render.use_compositing = scene.render.use_sequencer = False
-    image = scene.render.image_settings
-    if hasattr(image, "media_type"):
-        image.media_type = "IMAGE"
-    image.file_format, image.color_depth, image.color_mode = "OPEN_EXR", "32", "RGB"
-    share = scene.render.resolution_percentage / 100
-    size = [int(scene.render.resolution_x * share), int(scene.render.resolution_y * share)]
-    if hasattr(scene.afterglow, "time_limit"):
-        scene.afterglow.time_limit = 0
-    if hasattr(scene.afterglow, "denoise"):
-        scene.afterglow.denoise = False
-    answer({"resolution": size, "frame": scene.frame_current, "settings": in_use})
-    denoise = False
+    scene.collection.objects.link(bpy.data.objects.new("Sheet", mesh))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location = (0, 0, 4)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    scene.collection.objects.link(sun)
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    bpy.context.view_layer.update()
+    return {"triangles": 2 * len(corners)}
+
+
+def main() -> None:
+    descriptor, folder = sys.argv[sys.argv.index("--") + 1 :][:2]
+    answers = os.fdopen(int(descriptor), "w", buffering=1)
+    problem = enable_addon()
+    answers.write(json.dumps({"version": bpy.app.version_string, "problem": problem}) + "\n")
     for number, line in enumerate(sys.stdin):
+        job = json.loads(line)
         try:
-            settings = {"denoise": denoise, **json.loads(line)}
-            answer(render(scene, folder, number, settings))
+            kind = job["op"]
+            if kind == "open":
+                result = open_file(job)
+            elif kind == "render":
+                result = render(job, folder, number)
+            elif kind == "grid":
+                result = grid(job)
+            elif kind == "save":
+                bpy.ops.wm.save_as_mainfile(filepath=job["file"], copy=True)
+                result = {}
+            elif kind == "memory":
+                result = memory()
+            else:
+                raise ValueError(f"no job {kind!r}")
         except Exception as error:
-            answer({"error": f"{type(error).__name__}: {error}"})
+            result = {"error": f"{type(error).__name__}: {error}"}
+        sys.stdout.flush()
+        answers.write(json.dumps(result, default=float) + "\n")
 
 
 main()

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: what it prints and writes, and how it ends."""
+
+import json
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+
+def run(library: Path, *arguments: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "afterglow", *arguments], capture_output=True, text=True, cwd=cwd,
+                          env={**os.environ, "PYTHONPATH": str(library), **environment})
+
+
+def test_scenes_and_info(library: Path) -> None:
+    assert "cornell_box" in run(library, "scenes").stdout
+    text = run(library, "info").stdout
+    assert "PATH_TRACING" in text and "embree" in text
+
+
+def test_render_writes_an_image(library: Path, tmp_path: Path) -> None:
+    ended = run(library, "render", "cornell_box", str(tmp_path / "box.png"), "--samples", "1")
+    assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / "box.png").read_bytes().startswith(b"\x89PNG")
+    ended = run(library, "render", "no_such_scene", str(tmp_path / "box.png"))
+    assert ended.returncode == 2 and "cornell_box" in ended.stderr
+
+
+def test_accuracy_of_a_procedural_scene(library: Path, tmp_path: Path) -> None:
+    arguments = ("accuracy", "cornell_box", "--percent", "12", "--samples", "512", "--repeats", "2", "--budget", "4", "--method",
+                 "PATH_TRACING", "--output", str(tmp_path / "out"))
+    ended = run(library, *arguments, AFTERGLOW_CACHE=str(tmp_path / "cache"))
+    assert ended.returncode == 0, ended.stderr + ended.stdout
+    report = json.loads((tmp_path / "out" / "accuracy_cornell_box.json").read_text())
+    points = [p for p in report["points"] if p["method"] == "PATH_TRACING"]
+    assert len(points) >= 4
+    for dear, cheap in zip(points[1:], points):
+        # Four times the samples leave a quarter of the error.
+        assert dear["error"] < cheap["error"] + 3 * (dear["error_bar"] + cheap["error_bar"])
+        assert dear["error_bar"] > 0
+    assert points[-1]["error"] < 0.1 * points[0]["error"]
+    ElementTree.parse(tmp_path / "out" / "accuracy_cornell_box.svg")
+    again = run(library, *arguments, AFTERGLOW_CACHE=str(tmp_path / "cache"))
+    assert "reference:" in ended.stdout and "reference:" not in again.stdout, "the reference is kept"
+
+
+def test_accuracy_names_what_is_missing(library: Path, tmp_path: Path) -> None:
+    ended = run(library, "accuracy", "no_such_scene", cwd=tmp_path)
+    assert ended.returncode == 2 and "cornell_box" in ended.stderr
+    ended = run(library, "accuracy", "missing.blend", cwd=tmp_path)
+    assert ended.returncode == 2 and "missing.blend" in ended.stderr
+
+
+def test_bench_refuses_unknown_sets(library: Path) -> None:
+    ended = run(library, "bench", "no_such_set")
+    assert ended.returncode == 2 and "foundation" in ended.stderr
+
+
+@pytest.mark.slow
+def test_bench_writes_its_figures(library: Path, root: Path, tmp_path: Path) -> None:
+    ended = run(library, "bench", "foundation", "--only", "threads", "--output", str(tmp_path), cwd=root,
+                AFTERGLOW_SHARED=str(tmp_path))
+    data = json.loads((tmp_path / "foundation.json").read_text())
+    assert set(data) == {"machine", "versions", "figures"} and data["versions"]["embree"]
+    assert all(f["holds"] for f in data["figures"]) and ended.returncode == 0, ended.stdout
+    wanted = {"figure", "scene", "value", "unit", "peer", "peer_value", "ratio", "goal", "holds", "command"}
+    assert all(wanted <= set(f) for f in data["figures"])
+    ElementTree.parse(tmp_path / "foundation.svg")
