@@ -94,7 +94,7 @@ struct Lights::State {
   Rgb world_radiance{0.0f};
   float world_weight = 0.0f;
 
-  uint32_t finite() const { return uint32_t(lamps.size() + meshes.triangles().size()); }
+  uint32_t finite() const { return uint32_t(lamps.size() + meshes.patches().size()); }
 
   void collect_lamps(std::vector<std::string>& warnings);
   float graph_factor(const Lamp&) const;
@@ -104,7 +104,7 @@ struct Lights::State {
 
   bool shares(const Vec3& position, const Vec3& normal, Shares&) const;
   float suns_weight(const Vec3& normal) const;
-  Rgb emission_of(const EmissiveTriangle&, const Vec3& position, const TriangleSample&) const;
+  Rgb emission_of(const EmissivePatch&, const Vec3& position, const PatchSample&) const;
   Rgb with_graph(const Lamp& lamp, const Rgb& radiance, const Vec3& direction, const Vec2& uv) const {
     return lamp.has_graph ? radiance * materials->light(lamp.handle, lamp_local(lamp, -direction), uv) : radiance;
   }
@@ -158,8 +158,8 @@ void Lights::State::build_tree() {
   std::vector<LightBounds> bounds;
   bounds.reserve(finite());
   for (const Lamp& lamp : lamps) bounds.push_back(bounds_of(lamp, graph_factor(lamp)));
-  for (uint32_t i = 0; i < meshes.triangles().size(); ++i)
-    bounds.push_back(meshes.bounds(i, emission[meshes.triangles()[i].material].mean));
+  for (uint32_t i = 0; i < meshes.patches().size(); ++i)
+    bounds.push_back(meshes.bounds(i, emission[meshes.patches()[i].material].mean));
   tree.build(bounds);
 }
 
@@ -199,11 +199,11 @@ bool Lights::State::shares(const Vec3& position, const Vec3& normal, Shares& s) 
   return s.normalize();
 }
 
-Rgb Lights::State::emission_of(const EmissiveTriangle& t, const Vec3& position, const TriangleSample& s) const {
+Rgb Lights::State::emission_of(const EmissivePatch& t, const Vec3& position, const PatchSample& s) const {
   const Emission& e = emission[t.material];
   if (e.constant) return e.mean;
   const Ray ray{position, 0.0f, s.direction, kInfinity, kVisibleAll};
-  const Hit hit{s.distance, s.barycentric.x, s.barycentric.y, t.instance, t.triangle};
+  const Hit hit{s.distance, s.barycentric.x, s.barycentric.y, t.instance, s.triangle};
   const SurfacePoint point = surface_point(*scene, ray, hit, materials->reads_uv(t.material));
   return materials->emission(*scene, point, kEmissionContext);
 }
@@ -221,9 +221,9 @@ bool Lights::State::sample_finite(uint32_t light, const Vec3& position, const Ve
     out.visibility = lamp.visibility;
     return true;
   }
-  const EmissiveTriangle& t = meshes.triangles()[light - lamps.size()];
-  TriangleSample s;
-  if (!sample_triangle(t, position, u, s)) return false;
+  const EmissivePatch& t = meshes.patches()[light - lamps.size()];
+  PatchSample s;
+  if (!sample_patch(t, position, normal, u, s)) return false;
   out.direction = s.direction, out.distance = s.distance, out.density = s.density;
   out.radiance = emission_of(t, position, s);
   out.visibility = scene->instances()[t.instance].visibility;
@@ -304,7 +304,7 @@ void Lights::commit(const Scene& scene, const SceneChanges& changes, const Mater
 Effects Lights::effects() const {
   Effects effects;
   if (!state_->lamps.empty() || !state_->suns.empty()) effects.add(kPunctualLights);
-  if (!state_->meshes.triangles().empty()) effects.add(kEmissiveMesh);
+  if (!state_->meshes.patches().empty()) effects.add(kEmissiveMesh);
   if (state_->tree.size() > 16) effects.add(kManyLights);
   if (state_->has_world) effects.add(state_->world_constant ? kWorldConstant : kWorldVarying);
   return effects;
@@ -360,7 +360,7 @@ float Lights::density_of_triangle(const Vec3& position, const Vec3& normal, cons
   const float distance = glm::length(to_point);
   if (!(distance > 0.0f)) return 0.0f;
   const float probability = s.tree.probability(uint32_t(s.lamps.size()) + index, position, normal);
-  const float density = triangle_density(s.meshes.triangles()[index], position, to_point / distance, distance);
+  const float density = patch_density(s.meshes.patches()[index], position, normal, to_point / distance, distance);
   return shares.weight[kTree] * probability * density;
 }
 

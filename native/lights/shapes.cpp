@@ -110,6 +110,55 @@ Vec2 RectangleView::sample(const Vec2& u) const {
   return glm::clamp(Vec2((xu - x0_) / length_u_, (yv - y0_) / length_v_), Vec2(0.0f), Vec2(1.0f));
 }
 
+Vec2 RectangleView::invert(const Vec2& point) const {
+  // Along u: the share of the solid angle that lies before this line. Its part of the angles changes in one normal
+  // only.
+  const float xu = x0_ + std::clamp(point.x, 0.0f, 1.0f) * length_u_,
+              yv = y0_ + std::clamp(point.y, 0.0f, 1.0f) * length_v_;
+  const float n1 = xu / std::sqrt(z0_ * z0_ + xu * xu);
+  auto angle = [](float a, float b) { return std::acos(std::clamp(-a * b, -1.0f, 1.0f)); };
+  const float before = angle(b0_, n1) + angle(n1, b1_) - k_;
+  const float d2 = xu * xu + z0_ * z0_;
+  const float h0 = y0_ / std::sqrt(d2 + y0_ * y0_), h1 = y1_ / std::sqrt(d2 + y1_ * y1_);
+  const float hv = yv / std::sqrt(d2 + yv * yv);
+  return glm::clamp(Vec2(before / solid_angle_, (hv - h0) / (h1 - h0)), Vec2(0.0f), Vec2(1.0f));
+}
+
+CosineWarp::CosineWarp(float w00, float w10, float w01, float w11) {
+  const float most = std::max({w00, w10, w01, w11});
+  if (!(most > 0.0f)) return;
+  const float least = 0.05f * most;
+  const float w[4] = {std::max(w00, least), std::max(w10, least), std::max(w01, least), std::max(w11, least)};
+  const float mean = 0.25f * (w[0] + w[1] + w[2] + w[3]);
+  for (int i = 0; i < 4; ++i) w_[i] = w[i] / mean;
+  flat_ = false;
+}
+
+namespace {
+
+/// Inverse of the distribution of a density that is linear from a to b.
+float sample_linear(float u, float a, float b) {
+  if (std::fabs(a - b) < 1e-4f * (a + b)) return u;
+  const float x = u * (a + b) / (a + std::sqrt(a * a + u * (b * b - a * a)));
+  return std::min(x, 0x1.fffffep-1f);
+}
+
+}  // namespace
+
+Vec2 CosineWarp::sample(const Vec2& u, float& density_at) const {
+  density_at = 1.0f;
+  if (flat_) return u;
+  const float y = sample_linear(u.y, w_[0] + w_[1], w_[2] + w_[3]);
+  const float x = sample_linear(u.x, w_[0] + y * (w_[2] - w_[0]), w_[1] + y * (w_[3] - w_[1]));
+  const Vec2 p(x, y);
+  density_at = density(p);
+  return p;
+}
+
+float CosineWarp::density(const Vec2& p) const {
+  return (1.0f - p.y) * ((1.0f - p.x) * w_[0] + p.x * w_[1]) + p.y * ((1.0f - p.x) * w_[2] + p.x * w_[3]);
+}
+
 float triangle_solid_angle(const Vec3& a, const Vec3& b, const Vec3& c) {
   const float la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
   const float numerator = std::fabs(glm::dot(a, glm::cross(b - a, c - a)));

@@ -40,10 +40,26 @@ class RectangleView {
   /// Too small or too flat a view for the formulas in single precision: sample the area instead.
   bool usable() const { return usable_; }
   Vec2 sample(const Vec2& u) const;  // in units of the edges
+  Vec2 invert(const Vec2& point) const;
 
  private:
   float length_u_, length_v_, x0_, x1_, y0_, y1_, z0_, b0_, b1_, k_, solid_angle_ = 0.0f;
   bool usable_ = false;
+};
+
+/// A density over the unit square that is bilinear between its corners' weights, for cosines that vary over a shape.
+class CosineWarp {
+ public:
+  CosineWarp() = default;
+  /// Weights at (0,0), (1,0), (0,1), (1,1). Raised above zero, so that no part of the square is lost.
+  CosineWarp(float w00, float w10, float w01, float w11);
+  bool flat() const { return flat_; }
+  Vec2 sample(const Vec2& u, float& density) const;
+  float density(const Vec2& point) const;
+
+ private:
+  float w_[4] = {1, 1, 1, 1};
+  bool flat_ = true;
 };
 
 /// Solid angle of a triangle seen from the origin (van Oosterom and Strackee 1983).

@@ -340,7 +340,7 @@ def test_tree_densities_agree_for_many_shapes() -> None:
     scene.commit()
     point = (0.3, 0.2, 0)
     s = samples_of(scene, 100_000, point=point)
-    assert len(set(s["light"][s["valid"]])) > 150
+    assert len(set(s["light"][s["valid"]])) > 100
     hit = afterglow.light_density(scene, point, UP, s["direction"][s["valid"]])
     met = np.abs(hit["distance"] / s["distance"][s["valid"]] - 1) < 1e-3  # panels stand before quads
     assert met.mean() > 0.9
