@@ -6,6 +6,7 @@ from collections.abc import Callable
 from math import pi, sin
 from typing import Any
 
+import bpy
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,6 +41,8 @@ def read_light(light: Any, transform: NDArray[np.float64], context: Context, vis
     cycles = getattr(light, "cycles", None)
     color, power = np.array(light.color[:3], float), float(light.energy)
     power *= 2.0 ** float(getattr(light, "exposure", 0.0))
+    if light.type == "AREA" and bpy.app.version < (4, 0, 0):
+        power *= np.pi / 4.0  # Cycles 3.4 divides an area lamp's power by 4 m², 4.5 and 5.0 by pi (measured)
     if getattr(light, "use_temperature", False):
         color *= np.array(light.temperature_color[:3])
     if not getattr(light, "normalize", True):
