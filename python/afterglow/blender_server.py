@@ -56,6 +56,8 @@ def apply(scene: "bpy.types.Scene", engine: str, settings: dict) -> None:
         own = scene.afterglow
         # An unnamed setting keeps what the file says, but for these.
         for name, value in {"time_limit": 0.0, "denoise": False, **settings}.items():
+            if name not in own.bl_rna.properties:  # a property group takes any name in silence
+                raise AttributeError(f"{engine} has no setting '{name}'")
             setattr(own, name, value)
         return
     cycles = scene.cycles
@@ -73,6 +75,8 @@ def apply(scene: "bpy.types.Scene", engine: str, settings: dict) -> None:
     for name in ("method", "accuracy", "time_limit"):
         settings.pop(name, None)
     for name, value in settings.items():
+        if name not in cycles.bl_rna.properties:  # a property group takes any name in silence
+            raise AttributeError(f"{engine} has no setting '{name}'")
         setattr(cycles, name, value)
 
 
