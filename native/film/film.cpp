@@ -185,7 +185,7 @@ void Film::read(Pass pass, float* out, uint32_t step) const {
 
 BelievedError Film::believed_error() const {
   const size_t pixels = counts_.size(), batches = size_t(layout_[Pass::kBatches]);
-  std::vector<float> means(pixels), variances(pixels);
+  std::vector<float> means(pixels), errors(pixels);
   double total = 0.0;
   for (size_t p = 0; p < pixels; ++p) {
     std::array<float, kBatchCount> sums;
@@ -198,8 +198,7 @@ BelievedError Film::believed_error() const {
     if (samples < 2) return {};
     float sum = 0.0f;
     for (float s : sums) sum += s;
-    const float error = standard_error(sums.data(), samples);
-    means[p] = sum / float(samples), variances[p] = error * error;
+    means[p] = sum / float(samples), errors[p] = standard_error(sums.data(), samples);
     total += means[p];
   }
   if (!pixels) return {};
@@ -208,7 +207,7 @@ BelievedError Film::believed_error() const {
   const double e = 0.5 * double(pixels) / total;
   double sum = 0.0, squares = 0.0;
   for (size_t p = 0; p < pixels; ++p) {
-    const double m = e * means[p], r = e * e * variances[p] / (m * m + 0.01);
+    const double m = e * means[p], d = e * errors[p], r = d * d / (m * m + 0.01);
     sum += r, squares += r * r;
   }
   const double mean = sum / double(pixels);

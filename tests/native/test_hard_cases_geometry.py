@@ -294,7 +294,7 @@ def test_extreme_light_values_are_refused_or_finite() -> None:
 
 
 def test_non_finite_materials_and_worlds_stay_finite() -> None:
-    for value in (np.nan, np.inf, -5.0):
+    for value in (np.nan, np.inf, -5.0, 1e38):
         scene = one_quad(diffuse((value, 0.5, 0.5)))
         scene.world = background((1, 1, 1))
         render(scene, samples=4)
@@ -304,6 +304,23 @@ def test_non_finite_materials_and_worlds_stay_finite() -> None:
         scene.add("Lamp", sphere(0.2, 8, 4), "lamp", transform=translate((0, 0, 1)))
         scene.materials["lamp"] = node("emission", color=(1.0, 1.0, 1.0), strength=value)
         render(scene, samples=4)
+
+
+@pytest.mark.parametrize(("value", "shines"), [(1e25, True), (1e36, False), (3e38, False)])
+def test_light_beyond_the_film_is_dropped_and_counted(value: float, shines: bool) -> None:
+    """Sums of 32-bit floats must hold it, in every pass; the rest of the picture stays as it is."""
+    passes = ["diffuse_direct", "diffuse_indirect", "diffuse_color", "emission", "environment", "albedo", "error", "batches"]
+    scene = one_quad()
+    scene.world = background((1, 1, 1))
+    dark = render(scene, samples=64, passes=passes)
+    scene.add("Lamp", sphere(0.2, 8, 4), "lamp", transform=translate((0, 0, 1)))
+    scene.materials["lamp"] = node("emission", color=(1.0, 1.0, 1.0), strength=value)
+    bright = render(scene, samples=64, passes=passes)
+    assert dark.statistics["dropped"] == 0
+    assert (bright.statistics["dropped"] == 0) == shines
+    assert (bright.image[..., :3].max() > 1e20) == shines
+    if not shines:
+        assert bright.image[..., :3].mean() < 1.1 * dark.image[..., :3].mean()
 
 
 def test_odd_graphs_render_and_warn_once() -> None:

@@ -9,6 +9,10 @@
 
 namespace afterglow::path_tracing {
 
+/// What one contribution may bring at most, as the sum of its channels: a hundred million of them fit into a sum of
+/// 32-bit floats, and no light that means something is near. What is above is dropped and counted.
+inline constexpr float kMostLight = 1e30f;
+
 template <bool kPasses>
 class FilmVisitor {
  public:
@@ -45,6 +49,7 @@ class FilmVisitor {
     const bool direct = path.context.depth == 0;
     const Rgb arriving = path.throughput * light;
     const Rgb c = kept(arriving * value.total(), direct);
+    if (is_black(c)) return;
     light_ += c;
     if constexpr (kPasses) {
       if (direct) {
@@ -104,10 +109,10 @@ class FilmVisitor {
   }
 
  private:
-  /// Clamped, finite and not negative; what is dropped is counted.
+  /// Clamped, within bounds and not negative; what is dropped is counted.
   Rgb kept(const Rgb& light, bool direct) {
-    const float sum = light.x + light.y + light.z;
-    if (!(std::fabs(sum) < kInfinity)) {
+    const float sum = std::fabs(light.x) + std::fabs(light.y) + std::fabs(light.z);
+    if (!(sum <= kMostLight)) {
       counts_.dropped++;
       return Rgb(0.0f);
     }
