@@ -15,7 +15,6 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRESET = os.environ.get("AFTERGLOW_PRESET", "release")
 LIBRARY = Path(os.environ.get("AFTERGLOW_LIBRARY") or ROOT / "build" / PRESET / "python")
-OFFICIAL = ("4.5", "5.0")
 
 sys.path.insert(0, str(LIBRARY))
 sys.path.insert(0, str(ROOT / "tools"))

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every Blender that Afterglow promises to run in: `make test-blenders` calls it.
 
-The packaged extension is tested in official 4.2 LTS, 4.5 LTS and 5.0 (modules from PyPI), and the add-on, with the module built
-by the suite's own compiler and libraries, in Debian's 4.3.2 (trixie) and 5.2.2 (sid), windows included, in roots made by
-debootstrap under build/roots. Last, one picture from all of them is compared. Mounts live in a namespace of their own, so
-nothing stays mounted. Needs root."""
+Every test that official Blenders take part in runs in 4.2 LTS, 4.5 LTS and 5.0 (modules from PyPI), with the packaged extension.
+The native module, built by the suite's own compiler and libraries, its quick tests and all tests of the add-on, windows
+included, run in Debian's 4.3.2 (trixie) and 5.2.2 (sid), in roots made by debootstrap under build/roots; those programs check
+the extension's manifest, too. What the windows showed at the end of each test is kept under build/blenders. Last, one picture
+from all of them is compared. Mounts live in a namespace of their own, so nothing stays mounted. Needs root."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shlex
 import shutil
@@ -80,30 +80,34 @@ def build(suite: str) -> None:
 
 
 def test(suite: str, selection: list[str]) -> bool:
-    tests = " ".join(map(shlex.quote, selection)) or "tests/native tests/blender"
-    return inside(suite, f"/usr/bin/python3 -m pytest -p no:cacheprovider {tests}") == 0
+    """The native module's quick tests and all of the add-on, or the selection, in a suite's root; screenshots are kept."""
+    pictures = PICTURES / suite
+    shutil.rmtree(pictures, ignore_errors=True)
+    pictures.mkdir(parents=True)
+    pytest = f"AFTERGLOW_PICTURES={shlex.quote(str(pictures))} /usr/bin/python3 -m pytest -p no:cacheprovider"
+    if selection:
+        return inside(suite, f"{pytest} {' '.join(map(shlex.quote, selection))}") == 0
+    native = inside(suite, f"{pytest} -m 'not slow' tests/native") == 0
+    return (inside(suite, f"{pytest} tests/blender") == 0) and native
 
 
-def test_official(version: str) -> bool:
-    """The packaged extension in an official Blender, by the very test that `make test` runs for the others."""
-    python = venvs.ensure(version)
-    made = package.ensure()
-    folder = PICTURES / version
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    answer = folder / "answer.json"
-    script = ROOT / "tests" / "blender" / "package_inside.py"
-    command = [python, script, "--", made["extension"], ROOT / "blend_files" / "cornell_box.blend", answer, folder]
-    env = {name: value for name, value in os.environ.items() if name not in ("AFTERGLOW_LIBRARY", "PYTHONPATH")}
-    with (folder / "log.txt").open("w") as log:
-        subprocess.run(command, stdout=log, stderr=subprocess.STDOUT, env=env | {"BLENDER_USER_RESOURCES": str(folder / "user")})
-    if not answer.is_file():
-        print(f"official {version}: failed, see {folder}/log.txt")
-        return False
-    found = json.loads(answer.read_text())
-    good = found["cycles_unchanged"] and found["finite"] and abs(found["distance"] - 5) < 1e-5 and found["samples"] == 64
-    print(f"official {'.'.join(map(str, found['blender']))}: {'passed' if good else found}")
+def validate(suite: str) -> bool:
+    """The suite's Blender, as a program, accepts the extension's zip."""
+    zip_file = shlex.quote(str(package.ensure()["extension"]))
+    good = inside(suite, f"blender --command extension validate {zip_file}", quiet=True) == 0
+    print(f"{suite}: the extension is {'valid' if good else 'NOT VALID'}", flush=True)
     return good
+
+
+def test_official(versions: list[str]) -> bool:
+    """Every test that official Blenders take part in, in these versions."""
+    files = [ROOT / "tests" / "blender" / f"test_{name}.py" for name in ("package", "engine_official", "sync")]
+    # The tests themselves would skip what cannot be had; here it must be there.
+    package.ensure()
+    for version in versions:
+        venvs.ensure(version)
+    env = os.environ | {"AFTERGLOW_OFFICIAL": " ".join(versions)}
+    return subprocess.run([venvs.PYTHON, "-m", "pytest", *files], cwd=ROOT, env=env).returncode == 0
 
 
 def render(name: str, command: str | list[str | Path], suite: str = "") -> Path | None:
@@ -175,12 +179,13 @@ def main() -> int:
     PICTURES.mkdir(parents=True, exist_ok=True)
     failed = []
     if arguments.only in (None, "official"):
-        failed += [f"official {version}" for version in arguments.official if not test_official(version)]
+        failed += [] if test_official(arguments.official) else ["official Blender"]
     for suite in arguments.suites if arguments.only != "official" else []:
         make_root(suite)
         build(suite)
-        if arguments.only in (None, "debian") and not test(suite, arguments.tests):
-            failed.append(f"Debian {suite}")
+        if arguments.only in (None, "debian"):
+            failed += [] if test(suite, arguments.tests) else [f"Debian {suite}"]
+            failed += [] if validate(suite) else [f"the manifest in Debian {suite}"]
     if arguments.only in (None, "compare") and not compare(arguments.scene.resolve(), arguments.suites, arguments.official):
         failed.append("the comparison of pictures")
     print(f"failed: {', '.join(failed)}" if failed else "all Blenders passed")

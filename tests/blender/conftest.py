@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import textwrap
@@ -75,15 +76,20 @@ def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]
 
 
 @pytest.fixture
-def in_window(display: dict[str, str], library: Path, tmp_path: Path) -> Callable[..., dict[str, Any]]:
+def in_window(
+    display: dict[str, str], library: Path, tmp_path: Path, request: pytest.FixtureRequest
+) -> Iterator[Callable[..., dict[str, Any]]]:
     """in_window(text, file=None): runs the text in Blender with a real window of 800 by 600 pixels; the text ends with
-    `drive(steps)`. Gives what it handed to `result`, and under "output" what Blender printed."""
+    `drive(steps)`. Gives what it handed to `result`, and under "output" what Blender printed. The last screen of each test is
+    kept in the folder that AFTERGLOW_PICTURES names."""
+    shot = tmp_path / "screen.xwd"
 
     def run(text: str, file: Path | None = None, timeout: float = 120.0) -> dict[str, Any]:
         values = tmp_path / "result.json"
         values.unlink(missing_ok=True)
         script = write_script(tmp_path, text)
         env = os.environ | display | {"AFTERGLOW_RESULT": str(values), "AFTERGLOW_LIBRARY": str(library)}
+        env |= {"AFTERGLOW_SCREENSHOT": str(shot)} if "AFTERGLOW_PICTURES" in env else {}
         command = [str(ROOT / "build" / "blender"), "--factory-startup", "--window-geometry", "0", "0"]
         command += [*map(str, SCREEN), *([str(file)] if file else []), "--python", str(script)]
         start = time.time()
@@ -95,4 +101,7 @@ def in_window(display: dict[str, str], library: Path, tmp_path: Path) -> Callabl
         found = json.loads(values.read_text()) if values.is_file() else {}
         return {**found, "output": ended.stdout}
 
-    return run
+    yield run
+    if shot.is_file():
+        picture = Path(os.environ["AFTERGLOW_PICTURES"]) / (re.sub(r"\W+", "_", request.node.name).strip("_") + ".png")
+        subprocess.run(["convert", f"xwd:{shot}", str(picture)], check=True)

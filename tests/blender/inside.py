@@ -10,6 +10,7 @@ from __future__ import annotations
 import gc
 import json
 import os
+import shutil
 import sys
 import time
 import traceback
@@ -163,7 +164,7 @@ def settled(seconds: float = 60.0) -> Iterator[float]:
 
 def drive(steps: Callable[[], Iterator[float]]) -> None:
     """Runs a generator in the window: each value that it yields is the pause before its next step. Blender ends after
-    the last, with an error code when a step raised."""
+    the last, with an error code when a step raised. AFTERGLOW_SCREENSHOT names the file that keeps the last screen."""
     bpy.context.preferences.view.show_splash = False
     walk = steps()
 
@@ -171,6 +172,8 @@ def drive(steps: Callable[[], Iterator[float]]) -> None:
         try:
             return next(walk)
         except StopIteration:
+            if "AFTERGLOW_SCREENSHOT" in os.environ:
+                shutil.copyfile(os.environ["AFTERGLOW_SCREEN"], os.environ["AFTERGLOW_SCREENSHOT"])
             bpy.ops.wm.quit_blender()
         except BaseException:
             traceback.print_exc()

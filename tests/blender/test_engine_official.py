@@ -15,7 +15,7 @@ import pytest
 
 from .conftest import HERE, write_script
 
-VERSIONS = ["4.5", "5.0", *(["4.2"] if os.environ.get("AFTERGLOW_ALL_BLENDERS") else [])]
+VERSIONS = os.environ.get("AFTERGLOW_OFFICIAL", "4.5 5.0").split()
 pytestmark = pytest.mark.slow
 
 

@@ -91,6 +91,21 @@ NESTED = (
     Notice("xxHash (in OpenImageIO and Zstandard)", ("2012-2023 Yann Collet",), "bsd_2_clause",
            "https://github.com/Cyan4973/xxHash"),
 )
+# What compilers and linkers put into every binary that they make: keyed by what a binary's section .comment says of them.
+RUNTIMES = {
+    r"GCC: \((?:GNU|Debian)": (
+        Notice("GCC's run-time libraries (start-up objects, libgcc, what C++ templates bring, libstdc++_nonshared)",
+               ("1988-2025 Free Software Foundation, Inc.",), "gcc_exception",
+               "https://ftp.gnu.org/gnu/gcc/ (the versions named above; Red Hat's: https://git.centos.org/rpms/gcc)"),
+        Notice("GNU C Library (start-up objects and libc_nonshared)", ("1991-2025 Free Software Foundation, Inc.",),
+               "glibc_exception", "https://ftp.gnu.org/gnu/glibc/ (2.28; for the module also lib/libc/glibc of Zig's source)")),
+    r"clang version .*intel/llvm": (
+        Notice("LLVM (compiler-rt), as far as Intel's open compiler of Embree's binary brings it", ("LLVM contributors",),
+               "apache_2_0", "https://github.com/intel/llvm, commit 54cbbec17bcad512f18881562c5f204936e9f3b3; with the LLVM "
+               "exceptions: no notice is asked for what a compiler puts into its output"),),
+    r"Linker: LLD|clang version [\d.]+$": (
+        Notice("Zig's compiler runtime", ("Zig contributors",), "mit", "https://codeberg.org/ziglang/zig (0.17.1)"),),
+}
 # In the module that we compile and in Embree's own library.
 OURS = (
     Notice("Embree 4.4.0", ("2009-2025 Intel Corporation",), "apache_2_0",
@@ -101,7 +116,6 @@ OURS = (
            "the source of oneTBB (src/tbb/tools_api); https://github.com/intel/ittapi"),
     Notice("pybind11", ("2016 Wenzel Jakob and others",), "bsd_3_clause", "https://github.com/pybind/pybind11 (Debian 2.10.3-1)"),
     Notice("GLM", ("2005-present G-Truc Creation",), "mit", "https://github.com/g-truc/glm (Debian 0.9.9.8+ds-6)"),
-    Notice("Zig's compiler runtime", ("Zig contributors",), "mit", "https://codeberg.org/ziglang/zig (0.17.1)"),
     Notice("{fmt}, as far as headers of OpenImageIO bring it", ("2012-present Victor Zverovich",), "mit",
            "https://github.com/fmtlib/fmt (Debian 9.1.0+ds1-2)"),
     Notice("embreex, whose wheel Embree's library was taken from", ("2015 Anthony Scopatz",), "bsd_2_clause",

@@ -5,7 +5,9 @@ is (GPL-3.0, section 6)."""
 
 from __future__ import annotations
 
+import functools
 import re
+import subprocess
 import tarfile
 import zipfile
 from pathlib import Path
@@ -48,26 +50,50 @@ def contained(library: Path) -> list[tuple[contents.Notice, str]]:
     return [(contents.CONTAINED[name], version) for name, version in sorted(versions.items(), key=lambda it: it[0].lower())]
 
 
-def _commit(recipe: str) -> str:
-    """The commit that OpenImageIO's own recipe builds a library from, or ""."""
+def compilers(binary: Path) -> list[str]:
+    """What the binary's section .comment says of the compilers and linkers that made it."""
+    text = subprocess.run(["readelf", "-p", ".comment", str(binary)], check=True, capture_output=True, text=True).stdout
+    return sorted(set(re.findall(r"\]\s+(.*\S)", text)))
+
+
+def runtimes(package: Path) -> tuple[list[contents.Notice], list[str]]:
+    """The notices of what compilers put into the binaries by themselves, and a line for each binary: who made it.
+    RuntimeError for a compiler that the table does not know."""
+    used, lines = set(), []
+    for binary in [*sorted(package.glob("_native*.so")), *sorted((package / "libs").glob("*.so"))]:
+        makers = compilers(binary)
+        for maker in makers:
+            known = [pattern for pattern in contents.RUNTIMES if re.match(pattern, maker)]
+            if not known:
+                raise RuntimeError(f"{binary.name} was made by '{maker}': tools/shipping/contents.py knows nothing of its runtime")
+            used |= set(known)
+        lines.append(f"  {binary.name.split('.')[0]}: {'; '.join(makers)}")
+    return [notice for pattern, group in contents.RUNTIMES.items() if pattern in used for notice in group], lines
+
+
+@functools.cache
+def _recipes() -> dict[str, str]:
+    """{name of a library: the commit that OpenImageIO's own recipe builds it from}."""
+    inside, commits = re.compile(r"[^/]+/src/cmake/build_(.+)\.cmake"), {}
     with tarfile.open(downloads.fetch(downloads.OIIO_SOURCE)) as archive:
-        try:
-            text = archive.extractfile(f"openimageio-3.2.2.0/src/cmake/build_{recipe}.cmake").read().decode()
-        except KeyError:
-            return ""
-    found = re.search(r"GIT_COMMIT\s+\"([0-9a-f]{40})\"", text)
-    return found.group(1) if found else ""
+        for member in archive.getmembers():
+            if named := inside.fullmatch(member.name):
+                text = archive.extractfile(member).read().decode()
+                if found := re.search(r"GIT_COMMIT\s+\"([0-9a-f]{40})\"", text):
+                    commits[named.group(1)] = found.group(1)
+    return commits
 
 
 def _entry(notice: contents.Notice, version: str = "") -> str:
     lines = [f"{notice.title} {version}".strip(), *(f"  Copyright (c) {line}" for line in notice.copyrights)]
-    commit = _commit(notice.recipe) if notice.recipe else ""
+    commit = _recipes().get(notice.recipe, "")
     lines += [f"  Licence: {notice.licence} (text below)", f"  Source: {notice.source}" + (f", commit {commit}" if commit else "")]
     return "\n".join(lines)
 
 
 def _third_party(package: Path) -> str:
     inside = contained(package / "libs" / dependencies.LIBRARIES["oiio"])
+    brought, makers = runtimes(package)
     parts = ["Libraries inside Afterglow's package, their copyrights, licences and sources", RULE,
              "In the module, in libafterglow_embree4.so and in libafterglow_embree4_tbb.so", ""]
     parts += [_entry(notice) + "\n" for notice in contents.OURS]
@@ -76,7 +102,9 @@ def _third_party(package: Path) -> str:
               "its own notices below\n  Source: " + downloads.OIIO.source.split(": ", 1)[1] + "\n"]
     parts += [_entry(notice, version) + "\n" for notice, version in inside]
     parts += [_entry(notice) + "\n" for notice in contents.NESTED]
-    notices = [*contents.OURS, *(notice for notice, _ in inside), *contents.NESTED]
+    parts += [RULE, "In all of them, put there by the compilers and linkers that made them", "", *makers, ""]
+    parts += [_entry(notice) + "\n" for notice in brought]
+    notices = [*contents.OURS, *brought, *(notice for notice, _ in inside), *contents.NESTED]
     for licence in sorted({notice.licence for notice in notices} | {"apache_2_0"}):
         parts += [RULE, f"Licence {licence}", "", (LICENSES / f"{licence}.txt").read_text()]
     with zipfile.ZipFile(downloads.fetch(downloads.OIIO)) as wheel:
