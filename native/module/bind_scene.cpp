@@ -49,9 +49,16 @@ py::dict changes_of(const SceneChanges& changes, const CommittedScene& scene) {
   return out;
 }
 
+RayCaster::Flatten flatten_from(const py::object& value) {
+  if (py::isinstance<py::str>(value) && value.cast<std::string>() == "still") return RayCaster::Flatten::kStill;
+  if (py::isinstance<py::bool_>(value))
+    return value.cast<bool>() ? RayCaster::Flatten::kAlways : RayCaster::Flatten::kNever;
+  throw InvalidInput("commit: flatten must be True, False, \"still\" or None");
+}
+
 py::dict commit(PyScene& self, py::object flatten) {
   const EditLock lock(self);
-  if (!flatten.is_none()) self.options.flatten = flatten.cast<bool>();
+  if (!flatten.is_none()) self.options.flatten = flatten_from(flatten);
   SceneChanges changes;
   {
     const py::gil_scoped_release free;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Building and mending the two-level BVH: one scene a mesh, one place of the top level an instance. A moved instance
-// rebuilds the top level alone; a deformed mesh is refitted until its boxes have become loose.
+// The upper part of the BVH: instances of meshes, and beside them one common BVH of meshes that are used once, with
+// their triangles in world space. A moved instance rebuilds the top level alone.
 #include <algorithm>
-#include <cstring>
 #include <exception>
 
 #include "base/errors.h"
@@ -10,40 +9,6 @@
 #include "rays/ray_caster_state.h"
 
 namespace afterglow {
-
-namespace {
-
-constexpr uint32_t kMostRefits = 64;                          // then the BVH is built anew
-constexpr float kMostGrowth = 2.0f;                           // of the bounds' surface since the last build
-constexpr RTCSceneFlags kSceneFlags = RTC_SCENE_FLAG_ROBUST;  // watertight: thin walls must not leak
-
-float half_area(const Box& box) {
-  if (box.empty()) return 0.0f;
-  const Vec3 s = box.size();
-  return s.x * s.y + s.y * s.z + s.z * s.x;
-}
-
-bool same(const Affine& a, const Affine& b) { return a.x == b.x && a.y == b.y && a.z == b.z && a.p == b.p; }
-
-RTCGeometry triangles_of(RTCDevice device, const Mesh& mesh) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0, 12,
-                             mesh.triangle_count());
-  rtcSetGeometryMask(geometry, ~0u);
-  return geometry;
-}
-
-void share_positions(RTCGeometry geometry, const Mesh& mesh) {
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(), 0, 12,
-                             mesh.positions.size());
-}
-
-}  // namespace
-
-MeshBvh::~MeshBvh() {
-  if (geometry) rtcReleaseGeometry(geometry);
-  if (scene) rtcReleaseScene(scene);
-}
 
 RayCaster::State::State() : device(rtcNewDevice(nullptr)) {
   if (!device) throw Error("Embree cannot be started: error " + std::to_string(rtcGetDeviceError(nullptr)));
@@ -67,6 +32,7 @@ RayCaster::State::State() : device(rtcNewDevice(nullptr)) {
   top = rtcNewScene(device);
   rtcSetSceneFlags(top, kSceneFlags);
   rtcCommitScene(top);
+  root = top;
 }
 
 RayCaster::State::~State() {
@@ -85,144 +51,128 @@ void RayCaster::State::throw_on_error(const std::string& doing) {
   throw Error(text);
 }
 
+/// Empties a place. In the common BVH nothing can be taken out: its triangles stay, but no ray's mask meets them.
 void RayCaster::State::detach(uint32_t index) {
   PlacedGeometry& placed = places[index];
-  if (placed.geometry) {
-    rtcDetachGeometry(top, index);
-    rtcReleaseGeometry(placed.geometry);
-  }
+  if (placed.kind == PlacedGeometry::kInstance) rtcDetachGeometry(top, index + 1);
+  if (placed.kind == PlacedGeometry::kFlat) rtcSetGeometryMask(placed.geometry, 0);
+  if (placed.geometry) rtcReleaseGeometry(placed.geometry);
   placed = PlacedGeometry{};
 }
 
+void RayCaster::State::drop_flat() {
+  for (uint32_t index = 0; index < places.size(); ++index)
+    if (places[index].kind == PlacedGeometry::kFlat) detach(index);
+  if (flat_instance) {
+    rtcDetachGeometry(top, kFlatId);
+    rtcReleaseGeometry(flat_instance);
+  }
+  if (flat) rtcReleaseScene(flat);
+  flat = nullptr;
+  flat_instance = nullptr;
+}
+
 void RayCaster::State::clear() {
+  drop_flat();
   for (uint32_t index = 0; index < places.size(); ++index) detach(index);
   places.clear();
   meshes.clear();
 }
 
-/// Which places hold their mesh's triangles themselves: those whose mesh nobody else uses, when asked for.
-std::vector<bool> RayCaster::State::choose_flat(const Scene& scene, const Options& options) const {
+/// Which places stand in the common BVH from now on. Drops it when it has to be built anew.
+void RayCaster::State::choose_flat(const Scene& scene, const std::set<Handle>& changed, std::vector<bool>& is_flat) {
   const auto records = scene.instances();
-  std::vector<bool> flat(records.size(), false);
-  if (!options.flatten) return flat;
+  is_flat.assign(records.size(), false);
+  if (options.flatten == Flatten::kNever) return drop_flat();
   std::unordered_map<Handle, uint32_t> users;
   for (const InstanceRecord& record : records)
     if (record.mesh) ++users[record.mesh_handle];
-  for (size_t i = 0; i < records.size(); ++i) flat[i] = records[i].mesh && users[records[i].mesh_handle] == 1;
-  return flat;
+  std::vector<bool> wanted(records.size(), false);
+  uint64_t kept_triangles = 0;
+  bool all_kept = true;
+  for (size_t i = 0; i < records.size(); ++i) {
+    const InstanceRecord& record = records[i];
+    wanted[i] = record.mesh && !record.mesh->triangles.empty() && users[record.mesh_handle] == 1;
+    const bool stands = i < places.size() && places[i].kind == PlacedGeometry::kFlat;
+    is_flat[i] = stands && wanted[i] && places[i].mesh == record.mesh_handle && !changed.contains(record.mesh_handle) &&
+                 same(places[i].to_world, record.to_world);
+    if (is_flat[i]) kept_triangles += record.mesh->triangle_count();
+    all_kept &= is_flat[i] == wanted[i] && is_flat[i] == stands;
+  }
+  for (size_t i = records.size(); i < places.size(); ++i) all_kept &= places[i].kind != PlacedGeometry::kFlat;
+  const bool worn = !flat || 2 * kept_triangles < flat_triangles;
+  const bool keep = options.flatten == Flatten::kStill ? !worn : all_kept;
+  if (keep) return;
+  drop_flat();
+  is_flat = wanted;
 }
 
-void RayCaster::State::build_meshes(const Scene& scene, const std::set<Handle>& rebuild,
-                                    const std::set<Handle>& refit) {
-  struct Job {
-    const Mesh* mesh;
-    MeshBvh* bvh;
-    bool refit;
-  };
-  std::vector<Job> jobs;
-  for (const Handle handle : rebuild) {
-    auto& bvh = meshes[handle] = std::make_unique<MeshBvh>();
-    jobs.push_back({&scene.mesh(handle), bvh.get(), false});
-  }
-  for (const Handle handle : refit)
-    if (!rebuild.contains(handle)) jobs.push_back({&scene.mesh(handle), meshes.at(handle).get(), true});
-  // Large meshes first, so that no thread is left with one at the end.
-  std::stable_sort(jobs.begin(), jobs.end(),
-                   [](const Job& a, const Job& b) { return a.mesh->triangles.size() > b.mesh->triangles.size(); });
-  parallel_blocks(jobs.size(), 1, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      const auto& [mesh, bvh, again] = jobs[i];
-      if (!bvh->scene) {
-        bvh->scene = rtcNewScene(device);
-        rtcSetSceneFlags(bvh->scene, kSceneFlags);
-      }
-      const bool loose =
-          again && (bvh->refits >= kMostRefits || half_area(mesh->bounds) > kMostGrowth * bvh->first_area);
-      if (again && bvh->refitting && !loose) {
-        rtcUpdateGeometryBuffer(bvh->geometry, RTC_BUFFER_TYPE_VERTEX, 0);
-        ++bvh->refits;
-      } else {
-        if (bvh->geometry) {
-          rtcDetachGeometry(bvh->scene, 0);
-          rtcReleaseGeometry(bvh->geometry);
-        }
-        bvh->geometry = triangles_of(device, *mesh);
-        share_positions(bvh->geometry, *mesh);
-        if (again) {  // it moves: from now on a BVH that can follow
-          rtcSetSceneFlags(bvh->scene, RTCSceneFlags(kSceneFlags | RTC_SCENE_FLAG_DYNAMIC));
-          rtcSetSceneBuildQuality(bvh->scene, RTC_BUILD_QUALITY_LOW);
-          rtcSetGeometryBuildQuality(bvh->geometry, RTC_BUILD_QUALITY_REFIT);
-        }
-        bvh->refitting = again;
-        bvh->refits = 0;
-        bvh->first_area = half_area(mesh->bounds);
-        rtcAttachGeometryByID(bvh->scene, bvh->geometry, 0);
-      }
-      rtcCommitGeometry(bvh->geometry);
-      rtcCommitScene(bvh->scene);
+void RayCaster::State::build_flat(const Scene& scene, const std::vector<bool>& is_flat) {
+  if (std::find(is_flat.begin(), is_flat.end(), true) == is_flat.end()) return;
+  const auto records = scene.instances();
+  flat = rtcNewScene(device);
+  rtcSetSceneFlags(flat, kSceneFlags);
+  flat_triangles = 0;
+  std::vector<uint32_t> members;
+  for (uint32_t index = 0; index < records.size(); ++index)
+    if (is_flat[index]) {
+      detach(index);
+      members.push_back(index);
+      flat_triangles += records[index].mesh->triangle_count();
+    }
+  parallel_blocks(members.size(), 1, [&](size_t begin, size_t end) {
+    for (size_t m = begin; m < end; ++m) {
+      const InstanceRecord& record = records[members[m]];
+      PlacedGeometry& placed = places[members[m]];
+      placed = {PlacedGeometry::kFlat, flat_geometry(*record.mesh, record.to_world), record.mesh_handle,
+                record.visibility, record.to_world};
+      rtcSetGeometryMask(placed.geometry, record.visibility);
+      rtcCommitGeometry(placed.geometry);
     }
   });
-  throw_on_error("building the BVH of a mesh");
+  for (const uint32_t index : members) rtcAttachGeometryByID(flat, places[index].geometry, index);
+  rtcCommitScene(flat);
+  flat_instance = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(flat_instance, flat);
+  const Affine here;
+  rtcSetGeometryTransform(flat_instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &here);
+  rtcSetGeometryMask(flat_instance, ~0u);
+  rtcCommitGeometry(flat_instance);
+  rtcAttachGeometryByID(top, flat_instance, kFlatId);
 }
 
-RTCGeometry RayCaster::State::flat_geometry(const Mesh& mesh, const Affine& to_world) const {
-  RTCGeometry geometry = triangles_of(device, mesh);
-  if (same(to_world, Affine{})) {
-    share_positions(geometry, mesh);
-    return geometry;
-  }
-  auto* vertices = static_cast<float*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
-  if (!vertices) return geometry;  // the error function knows
-  for (size_t v = 0; v < mesh.positions.size(); ++v) {
-    const Vec3 p = to_world.point(mesh.positions[v]);
-    std::memcpy(vertices + 3 * v, &p.x, 12);
-  }
-  return geometry;
-}
-
-/// Brings the top level in step with the records; true when anything there changed.
-bool RayCaster::State::place(const Scene& scene, const std::vector<bool>& flat, const std::set<Handle>& changed) {
+/// Brings all places that are not in the common BVH in step with the records.
+void RayCaster::State::place_instances(const Scene& scene, const std::vector<bool>& is_flat,
+                                       const std::set<Handle>& changed) {
   const auto records = scene.instances();
-  bool any = false;
-  for (uint32_t index = uint32_t(records.size()); index < places.size(); ++index) {
-    any |= places[index].geometry != nullptr;
-    detach(index);
-  }
-  places.resize(records.size());
   for (uint32_t index = 0; index < records.size(); ++index) {
     const InstanceRecord& record = records[index];
     PlacedGeometry& placed = places[index];
-    const auto kind = !record.mesh || record.mesh->triangles.empty() ? PlacedGeometry::kEmpty
-                      : flat[index]                                  ? PlacedGeometry::kFlat
-                                                                     : PlacedGeometry::kInstance;
-    const bool mesh_changed = kind != PlacedGeometry::kEmpty && changed.contains(record.mesh_handle);
-    const bool moved = kind != PlacedGeometry::kEmpty && !same(placed.to_world, record.to_world);
-    const bool anew = placed.kind != kind || placed.mesh != (kind ? record.mesh_handle : 0) ||
-                      (kind == PlacedGeometry::kFlat && (mesh_changed || moved));
-    if (!anew && kind == PlacedGeometry::kEmpty) continue;
-    if (!anew && !moved && !mesh_changed && placed.visibility == record.visibility) continue;
-    any = true;
+    if (is_flat[index]) {
+      if (placed.visibility != record.visibility) rtcSetGeometryMask(placed.geometry, record.visibility);
+      placed.visibility = record.visibility;
+      continue;
+    }
+    if (!record.mesh || record.mesh->triangles.empty()) {
+      detach(index);
+      continue;
+    }
+    const bool anew = placed.kind != PlacedGeometry::kInstance || placed.mesh != record.mesh_handle;
+    if (!anew && !changed.contains(record.mesh_handle) && same(placed.to_world, record.to_world) &&
+        placed.visibility == record.visibility)
+      continue;
     if (anew) {
       detach(index);
-      if (kind == PlacedGeometry::kEmpty) continue;
-      placed.geometry = kind == PlacedGeometry::kFlat ? flat_geometry(*record.mesh, record.to_world)
-                                                      : rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
-      rtcAttachGeometryByID(top, placed.geometry, index);
-      placed.kind = kind;
-      placed.mesh = record.mesh_handle;
+      placed.geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
+      rtcAttachGeometryByID(top, placed.geometry, index + 1);
     }
-    if (kind == PlacedGeometry::kInstance) {
-      static_assert(sizeof(Affine) == 48);
-      rtcSetGeometryInstancedScene(placed.geometry, meshes.at(record.mesh_handle)->scene);
-      rtcSetGeometryTransform(placed.geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &record.to_world);
-    }
+    placed = {PlacedGeometry::kInstance, placed.geometry, record.mesh_handle, record.visibility, record.to_world};
+    static_assert(sizeof(Affine) == 48);
+    rtcSetGeometryInstancedScene(placed.geometry, meshes.at(record.mesh_handle)->scene);
+    rtcSetGeometryTransform(placed.geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &record.to_world);
     rtcSetGeometryMask(placed.geometry, record.visibility);
-    placed.to_world = record.to_world;
-    placed.visibility = record.visibility;
     rtcCommitGeometry(placed.geometry);
   }
-  return any;
 }
 
 std::string ray_library_version() { return RTC_VERSION_STRING; }
@@ -230,28 +180,45 @@ std::string ray_library_version() { return RTC_VERSION_STRING; }
 RayCaster::RayCaster() : state_(std::make_unique<State>()) {}
 RayCaster::~RayCaster() = default;
 
+namespace {
+
+bool touches_geometry(const SceneChanges& c) {
+  return c.everything || c.origin || !c.meshes_added.empty() || !c.meshes_deformed.empty() ||
+         !c.meshes_replaced.empty() || !c.meshes_removed.empty() || !c.instances_added.empty() ||
+         !c.instances_edited.empty() || !c.instances_moved.empty() || !c.instances_removed.empty();
+}
+
+}  // namespace
+
 void RayCaster::commit(const Scene& scene, const SceneChanges& changes, Options options) {
   State& s = *state_;
+  if (!touches_geometry(changes) && options.flatten == s.options.flatten) return;
   const FlushDenormals flush;
+  s.options = options;
   if (changes.everything) s.clear();
-  const std::vector<bool> flat = s.choose_flat(scene, options);
-  std::set<Handle> changed(changes.meshes_replaced.begin(), changes.meshes_replaced.end());
-  std::set<Handle> rebuild, refit;
-  for (const Handle handle : changes.meshes_deformed) changed.insert(handle);
-  std::set<Handle> instanced;
   const auto records = scene.instances();
+  std::set<Handle> changed(changes.meshes_replaced.begin(), changes.meshes_replaced.end());
+  changed.insert(changes.meshes_deformed.begin(), changes.meshes_deformed.end());
+  for (uint32_t index = uint32_t(records.size()); index < s.places.size(); ++index) s.detach(index);
+
+  std::vector<bool> is_flat;
+  s.choose_flat(scene, changed, is_flat);
+  s.places.resize(records.size());
+  std::set<Handle> instanced, rebuild, refit;
   for (size_t i = 0; i < records.size(); ++i)
-    if (records[i].mesh && !flat[i] && !records[i].mesh->triangles.empty()) instanced.insert(records[i].mesh_handle);
-  for (const Handle handle : changes.meshes_replaced)
-    if (instanced.contains(handle)) rebuild.insert(handle);
+    if (records[i].mesh && !is_flat[i] && !records[i].mesh->triangles.empty()) instanced.insert(records[i].mesh_handle);
   for (const Handle handle : instanced)
     if (!s.meshes.contains(handle)) rebuild.insert(handle);
+  for (const Handle handle : changes.meshes_replaced)
+    if (instanced.contains(handle)) rebuild.insert(handle);
   for (const Handle handle : changes.meshes_deformed)
     if (instanced.contains(handle) && !rebuild.contains(handle)) refit.insert(handle);
   s.build_meshes(scene, rebuild, refit);
-  const bool any = s.place(scene, flat, changed);
+  if (!s.flat) s.build_flat(scene, is_flat);
+  s.place_instances(scene, is_flat, changed);
   std::erase_if(s.meshes, [&](const auto& entry) { return !instanced.contains(entry.first); });
-  if (any) rtcCommitScene(s.top);
+  s.root = instanced.empty() && s.flat ? s.flat : s.top;
+  rtcCommitScene(s.top);  // at once done when nothing there changed
   s.throw_on_error("building the BVH of the scene");
 }
 

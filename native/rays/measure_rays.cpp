@@ -2,8 +2,9 @@
 // The wrapper against bare Embree calls: see measure_rays.h.
 #include "rays/measure_rays.h"
 
+#include <time.h>
+
 #include <algorithm>
-#include <chrono>
 
 #include "base/errors.h"
 #include "base/parallel.h"
@@ -13,11 +14,18 @@ namespace afterglow {
 
 namespace {
 
+/// Of this thread alone, so that other programs on the machine do not count.
+double thread_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
+}
+
 template <class Work>
 double seconds(const Work& work) {
-  const auto start = std::chrono::steady_clock::now();
+  const double start = thread_seconds();
   work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return thread_seconds() - start;
 }
 
 /// Embree's own structures, filled before the clock runs.
@@ -46,7 +54,7 @@ std::vector<RTCRayHit> bare_rays(std::span<const Ray> rays) {
 }  // namespace
 
 struct RayMeasurement {
-  static RTCScene scene(const RayCaster& rays) { return rays.state_->top; }
+  static RTCScene scene(const RayCaster& rays) { return rays.state_->root; }
 };
 
 RayTimings measure_rays(const RayCaster& caster, std::span<const Ray> rays, bool occlusion, int rounds) {

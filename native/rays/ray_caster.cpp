@@ -52,13 +52,16 @@ bool RayCaster::closest(const Ray& ray, Hit& hit) const {
   fill(query.ray, ray);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  embree::closest(state_->top, query);
+  embree::closest(state_->root, query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
   hit.t = query.ray.tfar;
   hit.u = query.hit.u;
   hit.v = query.hit.v;
-  // An instance and a mesh that stands in the top level by itself have the same id there: the dense instance index.
-  hit.instance = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? query.hit.instID[0] : query.hit.geomID;
+  // Met in the common BVH (by itself: no instance; below the top level: instance 0) the mesh has its place as id, an
+  // instance has its place + 1.
+  static_assert(RTC_INVALID_GEOMETRY_ID == ~0u && kFlatId == 0);
+  const uint32_t instance = query.hit.instID[0];
+  hit.instance = instance + 1 <= 1 ? query.hit.geomID : instance - 1;
   hit.triangle = query.hit.primID;
   return true;
 }
@@ -67,7 +70,7 @@ bool RayCaster::occluded(const Ray& ray) const {
   if (!usable(ray)) return false;
   RTCRay query;
   fill(query, ray);
-  embree::occluded(state_->top, query);
+  embree::occluded(state_->root, query);
   return query.tfar < 0.0f;
 }
 

@@ -33,10 +33,15 @@ std::string ray_library_version();
 
 class RayCaster {
  public:
+  /// Meshes that one instance alone uses may stand in a common BVH with their triangles in world space: rays through it
+  /// are half as fast again, but what stands there cannot be changed by itself.
+  enum class Flatten : uint8_t {
+    kNever,
+    kAlways,  // built anew when anything in it changed: same rays for the same scene, whatever came before
+    kStill,   // for viewports: what changes leaves it and gets a BVH of its own, at once
+  };
   struct Options {
-    /// Instances whose mesh is used once go straight into the top-level BVH: faster rays, slower edits. For final
-    /// renders.
-    bool flatten = false;
+    Flatten flatten = Flatten::kNever;
   };
   RayCaster();
   ~RayCaster();

@@ -23,21 +23,30 @@ struct MeshBvh {
   ~MeshBvh();
 };
 
-/// What stands at one place of the top level.
+/// What stands at one place, that is, at one dense instance index.
 struct PlacedGeometry {
   enum Kind : uint8_t { kEmpty, kInstance, kFlat };
   Kind kind = kEmpty;
-  RTCGeometry geometry = nullptr;
+  RTCGeometry geometry = nullptr;  // of the top level (kInstance) or of the common BVH (kFlat)
   Handle mesh = 0;
   uint32_t visibility = 0;
   Affine to_world;
 };
 
+/// The common BVH of flattened meshes has the id 0 in the top level, the instance at place i the id i + 1. In the
+/// common BVH, the id is the place.
+inline constexpr uint32_t kFlatId = 0;
+
 struct RayCaster::State {
   RTCDevice device = nullptr;
   RTCScene top = nullptr;
+  RTCScene flat = nullptr;              // common BVH, or none
+  RTCGeometry flat_instance = nullptr;  // it in the top level
+  RTCScene root = nullptr;  // where rays start: the top level, or the common BVH where there is nothing else
   std::unordered_map<Handle, std::unique_ptr<MeshBvh>> meshes;
   std::vector<PlacedGeometry> places;
+  uint64_t flat_triangles = 0;  // when the common BVH was built
+  Options options;
   std::atomic<int64_t> device_bytes{0};
   std::mutex error_lock;
   RTCError error = RTC_ERROR_NONE;
@@ -47,11 +56,22 @@ struct RayCaster::State {
   ~State();
   void throw_on_error(const std::string& doing);
   void clear();
-  void build_meshes(const Scene&, const std::set<Handle>& rebuild, const std::set<Handle>& refit);
-  bool place(const Scene&, const std::vector<bool>& flat, const std::set<Handle>& changed);
-  void detach(uint32_t index);
+
+  // mesh_bvh.cpp
+  RTCGeometry triangles_of(const Mesh&) const;
   RTCGeometry flat_geometry(const Mesh&, const Affine&) const;
-  std::vector<bool> choose_flat(const Scene&, const Options&) const;
+  void build_meshes(const Scene&, const std::set<Handle>& rebuild, const std::set<Handle>& refit);
+
+  // bvh_build.cpp
+  void choose_flat(const Scene&, const std::set<Handle>& changed, std::vector<bool>& is_flat);
+  void drop_flat();
+  void build_flat(const Scene&, const std::vector<bool>& is_flat);
+  void place_instances(const Scene&, const std::vector<bool>& is_flat, const std::set<Handle>& changed);
+  void detach(uint32_t index);
 };
+
+constexpr RTCSceneFlags kSceneFlags = RTC_SCENE_FLAG_ROBUST;  // watertight: a fifth slower, but walls must not leak
+
+inline bool same(const Affine& a, const Affine& b) { return a.x == b.x && a.y == b.y && a.z == b.z && a.p == b.p; }
 
 }  // namespace afterglow

@@ -20,6 +20,7 @@ class ChangeSet {
   void note(Table, Handle, Event);
   void moved(const MovedInstance&);
   bool has(Table table, Handle handle, Event event) const;
+  bool any(Table table) const { return !tables_[table].empty(); }
   /// Appends what came later.
   void join(const ChangeSet& later);
   SceneChanges list() const;

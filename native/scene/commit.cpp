@@ -129,11 +129,14 @@ void Scene::State::place_slots() {
 
 SceneChanges Scene::commit() {
   State& s = *state_;
-  s.place_materials();
-  s.place_instances();
-  s.choose_origin();
-  s.place_slots();
-  s.note_moves();
+  if (s.objects_touched()) {
+    s.place_materials();
+    s.place_instances();
+    s.choose_origin();
+    s.place_slots();
+    s.note_moves();
+    s.transforms_touched = false;
+  }
   records_ = s.records;
   slots_ = s.slots;
   SceneChanges changes = s.pending.list();

@@ -120,7 +120,7 @@ Handle Scene::add_instance(Instance instance) {
 void Scene::set_instance(Handle handle, Instance instance) {
   InstanceRow& row = state_->instances.at(handle);
   state_->meshes.at(instance.mesh);
-  if (instance.transform != row.instance.transform) row.moved = true;
+  if (instance.transform != row.instance.transform) row.moved = state_->transforms_touched = true;
   row.instance = std::move(instance);
   state_->pending.note(ChangeSet::kInstance, handle, ChangeSet::kEdited);
 }
@@ -129,7 +129,7 @@ void Scene::set_transform(Handle handle, const DMat4& transform) {
   InstanceRow& row = state_->instances.at(handle);
   if (transform == row.instance.transform) return;
   row.instance.transform = transform;
-  row.moved = true;
+  row.moved = state_->transforms_touched = true;
 }
 
 void Scene::remove_instance(Handle handle) {

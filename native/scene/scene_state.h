@@ -78,7 +78,12 @@ struct Scene::State {
   std::vector<uint32_t> slots{0};
   DVec3 origin{0.0};
   Box bounds;
+  bool transforms_touched = false;
 
+  bool objects_touched() const {
+    return transforms_touched || !freed_now.empty() || pending.any(ChangeSet::kMesh) ||
+           pending.any(ChangeSet::kInstance) || pending.any(ChangeSet::kMaterial) || !freed_materials_now.empty();
+  }
   void place_materials();
   void place_instances();
   void place_slots();

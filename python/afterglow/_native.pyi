@@ -164,9 +164,10 @@ class Scene:
         scene units; "panorama" (equirectangular): panorama (longitude min, max, latitude min, max). The camera looks along
         its local −z, y up. The window is stretched over the full image; border and shift are the caller's arithmetic
         (RenderSettings.region renders a part)."""
-    def commit(self, flatten: bool | None = None) -> Changes:
-        """flatten: meshes that one instance alone uses stand in the top-level BVH by themselves from now on: faster rays,
-        slower edits. For final renders. None: as before."""
+    def commit(self, flatten: bool | str | None = None) -> Changes:
+        """flatten: meshes that one instance alone uses stand in one common BVH from now on: rays half as fast again. True,
+        for final renders: built anew when anything in it changed. "still", for viewports: what changes leaves it and gets a
+        BVH of its own, at once. None: as before, False at first."""
     def changes_since(self, version: int) -> dict[str, Any]:
         """Handles of what changed in the commits after `version`, by kind (meshes_added, instances_moved, …), and the flags
         everything (the log is too short to tell), camera, world, origin."""

@@ -89,7 +89,7 @@ def check_against_brute_force(scene: Any, objects: dict[int, Any], random: np.ra
     assert (scene.occluded(origins, targets) == (distance < 4.0))[same & ~near].all()
 
 
-@pytest.mark.parametrize("flatten", [False, True])
+@pytest.mark.parametrize("flatten", [False, True, "still"])
 @pytest.mark.parametrize("seed", range(3))
 def test_random_edits_trace_like_brute_force(ag, seed: int, flatten: bool) -> None:
     random = np.random.default_rng(seed)
@@ -122,7 +122,7 @@ def test_random_edits_trace_like_brute_force(ag, seed: int, flatten: bool) -> No
                 mesh = objects[handle][0]
                 meshes[mesh] = soup(random, int(random.integers(1, 30)))
                 scene.set_mesh(mesh, name="m", positions=meshes[mesh][0], triangles=meshes[mesh][1])
-        scene.commit(flatten if step != 20 else not flatten)
+        scene.commit(flatten if step != 20 else (not flatten))
         check_against_brute_force(scene, {h: (*meshes[m], matrix) for h, (m, matrix) in objects.items()}, random)
 
 
@@ -220,10 +220,11 @@ def test_moving_an_instance_builds_no_mesh(ag) -> None:
     assert min(moves) < 0.05 * first
 
 
-def test_visibility_bits_are_kept_apart(ag) -> None:
+@pytest.mark.parametrize("flatten", [False, True, "still"])
+def test_visibility_bits_are_kept_apart(ag, flatten: Any) -> None:
     scene = ag.Scene()
     handle = scene.add_instances(square(scene), at(), name="o", visibility=ag.DIFFUSE)
-    scene.commit()
+    scene.commit(flatten)
     assert down(scene, 0.5, 0.4)["instance"][0] == handle[0]
     scene.set_instances(handle, visibility=0)
     scene.commit()
@@ -231,6 +232,25 @@ def test_visibility_bits_are_kept_apart(ag) -> None:
     scene.set_instances(handle, visibility=ag.ALL_RAYS)
     scene.commit()
     assert down(scene, 0.5, 0.4)["instance"][0] == handle[0]
+
+
+def test_what_changes_leaves_the_common_bvh_at_once(ag) -> None:
+    """commit("still"): an edit of a small object costs little beside a large one that stands still."""
+    large, small = sphere(512, 1024), sphere(8, 16)
+    scene = ag.Scene()
+    scene.add_instances(scene.add_mesh(name="large", positions=large[0], triangles=large[1]), np.eye(4), name="large")
+    mesh = scene.add_mesh(name="small", positions=small[0], triangles=small[1])
+    handle = scene.add_instances(mesh, at(z=5.0), name="small")
+    first = scene.commit("still")["seconds"]
+    edits = []
+    for x in range(1, 6):
+        scene.set_transforms(handle, at(x=3.0 * x, z=5.0)[None])
+        scene.set_mesh(mesh, positions=small[0] * (1.0 + 0.1 * x))
+        edits.append(scene.commit()["seconds"])
+        hit = scene.intersect([[3.0 * x, 0.01, 9.0], [0.0, 0.01, 9.0]], [[0, 0, -1.0], [0, 0, -1.0]])
+        assert hit["instance"][0] == handle[0] and abs(hit["distance"][0] - (3.0 - 0.1 * x)) < 0.1
+        assert hit["instance"][1] != handle[0] and abs(hit["distance"][1] - 8.0) < 0.01
+    assert min(edits) < 0.05 * first
 
 
 def test_non_finite_rays_hit_nothing(ag) -> None:
