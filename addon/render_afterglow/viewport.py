@@ -140,7 +140,7 @@ class Viewport:
             with self.session.edit():
                 self._sync(context, depsgraph)
                 self._set_view(context, depsgraph)
-                self.native.scene.commit()
+                self.native.scene.commit("still")
             self.watcher.wake()
         for text in self.native.take_warnings():
             print("Afterglow:", text)
@@ -152,7 +152,7 @@ class Viewport:
     def _start(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         self.view, self.settings = self._wanted(context, depsgraph)
         self.native.scene.set_camera(**self.view.camera)
-        self.native.scene.commit()
+        self.native.scene.commit("still")
         self.session = backend.afterglow.Session(self.native.scene, self.settings)
         self.session.start()
         self.watcher.watch(self.session)
@@ -188,7 +188,7 @@ class Viewport:
                     self.native.scene.set_camera(**view.camera)
                 if changed:
                     self.session.update(changed)
-                self.native.scene.commit()
+                self.native.scene.commit("still")
             self.watcher.wake()
         self._pause(depsgraph.scene.afterglow.preview_pause)
 

@@ -57,7 +57,9 @@ void RayCaster::State::detach(uint32_t index) {
   if (placed.kind == PlacedGeometry::kInstance) rtcDetachGeometry(top, index + 1);
   if (placed.kind == PlacedGeometry::kFlat) rtcSetGeometryMask(placed.geometry, 0);
   if (placed.geometry) rtcReleaseGeometry(placed.geometry);
+  const uint32_t changed = placed.changed;
   placed = PlacedGeometry{};
+  placed.changed = changed;
 }
 
 void RayCaster::State::drop_flat() {
@@ -70,6 +72,7 @@ void RayCaster::State::drop_flat() {
   if (flat) rtcReleaseScene(flat);
   flat = nullptr;
   flat_instance = nullptr;
+  flat_triangles = 0;
 }
 
 void RayCaster::State::clear() {
@@ -77,31 +80,41 @@ void RayCaster::State::clear() {
   for (uint32_t index = 0; index < places.size(); ++index) detach(index);
   places.clear();
   meshes.clear();
+  flat_chosen = false;
 }
 
 /// Which places stand in the common BVH from now on. Drops it when it has to be built anew.
-void RayCaster::State::choose_flat(const Scene& scene, const std::set<Handle>& changed, std::vector<bool>& is_flat) {
+void RayCaster::State::choose_flat(const Scene& scene, const std::set<Handle>& replaced,
+                                   const std::set<Handle>& changed, std::vector<bool>& is_flat) {
   const auto records = scene.instances();
   is_flat.assign(records.size(), false);
   if (options.flatten == Flatten::kNever) return drop_flat();
+  const bool still = options.flatten == Flatten::kStill;
   std::unordered_map<Handle, uint32_t> users;
   for (const InstanceRecord& record : records)
     if (record.mesh) ++users[record.mesh_handle];
   std::vector<bool> wanted(records.size(), false);
   uint64_t kept_triangles = 0;
   bool all_kept = true;
+  ++flat_commits;
   for (size_t i = 0; i < records.size(); ++i) {
     const InstanceRecord& record = records[i];
-    wanted[i] = record.mesh && !record.mesh->triangles.empty() && users[record.mesh_handle] == 1;
-    const bool stands = i < places.size() && places[i].kind == PlacedGeometry::kFlat;
-    is_flat[i] = stands && wanted[i] && places[i].mesh == record.mesh_handle && !changed.contains(record.mesh_handle) &&
-                 same(places[i].to_world, record.to_world);
+    PlacedGeometry& placed = places[i];
+    const bool single = record.mesh && !record.mesh->triangles.empty() && users[record.mesh_handle] == 1;
+    const bool same_as_before = placed.kind != PlacedGeometry::kEmpty && placed.mesh == record.mesh_handle &&
+                                !changed.contains(record.mesh_handle) && same(placed.to_world, record.to_world);
+    const bool stands = placed.kind == PlacedGeometry::kFlat;
+    const bool was_quiet = flat_commits - placed.changed >= kQuietCommits;
+    const bool built_anyway = placed.mesh != record.mesh_handle || replaced.contains(record.mesh_handle);
+    const bool quiet = stands ? same_as_before || (built_anyway && was_quiet) : was_quiet;
+    if (!same_as_before && placed.kind != PlacedGeometry::kEmpty) placed.changed = flat_commits;
+    is_flat[i] = stands && single && same_as_before;
+    wanted[i] = single && (!still || (record.mesh->triangle_count() <= kMostStillTriangles && (!flat_chosen || quiet)));
     if (is_flat[i]) kept_triangles += record.mesh->triangle_count();
     all_kept &= is_flat[i] == wanted[i] && is_flat[i] == stands;
   }
-  for (size_t i = records.size(); i < places.size(); ++i) all_kept &= places[i].kind != PlacedGeometry::kFlat;
-  const bool worn = !flat || 2 * kept_triangles < flat_triangles;
-  const bool keep = options.flatten == Flatten::kStill ? !worn : all_kept;
+  const bool keep = still ? flat_chosen && 2 * kept_triangles >= flat_triangles : all_kept;
+  flat_chosen = true;
   if (keep) return;
   drop_flat();
   is_flat = wanted;
@@ -124,8 +137,9 @@ void RayCaster::State::build_flat(const Scene& scene, const std::vector<bool>& i
     for (size_t m = begin; m < end; ++m) {
       const InstanceRecord& record = records[members[m]];
       PlacedGeometry& placed = places[members[m]];
-      placed = {PlacedGeometry::kFlat, flat_geometry(*record.mesh, record.to_world), record.mesh_handle,
-                record.visibility, record.to_world};
+      placed = {PlacedGeometry::kFlat, flat_geometry(*record.mesh, record.to_world),
+                record.mesh_handle,    record.visibility,
+                placed.changed,        record.to_world};
       rtcSetGeometryMask(placed.geometry, record.visibility);
       rtcCommitGeometry(placed.geometry);
     }
@@ -166,7 +180,8 @@ void RayCaster::State::place_instances(const Scene& scene, const std::vector<boo
       placed.geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
       rtcAttachGeometryByID(top, placed.geometry, index + 1);
     }
-    placed = {PlacedGeometry::kInstance, placed.geometry, record.mesh_handle, record.visibility, record.to_world};
+    placed = {PlacedGeometry::kInstance, placed.geometry, record.mesh_handle,
+              record.visibility,         placed.changed,  record.to_world};
     static_assert(sizeof(Affine) == 48);
     rtcSetGeometryInstancedScene(placed.geometry, meshes.at(record.mesh_handle)->scene);
     rtcSetGeometryTransform(placed.geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &record.to_world);
@@ -194,16 +209,18 @@ void RayCaster::commit(const Scene& scene, const SceneChanges& changes, Options 
   State& s = *state_;
   if (!touches_geometry(changes) && options.flatten == s.options.flatten) return;
   const FlushDenormals flush;
+  if (options.flatten != s.options.flatten) s.flat_chosen = false;
   s.options = options;
   if (changes.everything) s.clear();
   const auto records = scene.instances();
-  std::set<Handle> changed(changes.meshes_replaced.begin(), changes.meshes_replaced.end());
+  const std::set<Handle> replaced(changes.meshes_replaced.begin(), changes.meshes_replaced.end());
+  std::set<Handle> changed = replaced;
   changed.insert(changes.meshes_deformed.begin(), changes.meshes_deformed.end());
   for (uint32_t index = uint32_t(records.size()); index < s.places.size(); ++index) s.detach(index);
 
-  std::vector<bool> is_flat;
-  s.choose_flat(scene, changed, is_flat);
   s.places.resize(records.size());
+  std::vector<bool> is_flat;
+  s.choose_flat(scene, replaced, changed, is_flat);
   std::set<Handle> instanced, rebuild, refit;
   for (size_t i = 0; i < records.size(); ++i)
     if (records[i].mesh && !is_flat[i] && !records[i].mesh->triangles.empty()) instanced.insert(records[i].mesh_handle);

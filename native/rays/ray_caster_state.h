@@ -30,12 +30,17 @@ struct PlacedGeometry {
   RTCGeometry geometry = nullptr;  // of the top level (kInstance) or of the common BVH (kFlat)
   Handle mesh = 0;
   uint32_t visibility = 0;
+  uint32_t changed = 0;  // State::flat_commits when its mesh or place changed last
   Affine to_world;
 };
 
 /// The common BVH of flattened meshes has the id 0 in the top level, the instance at place i the id i + 1. In the
 /// common BVH, the id is the place.
 inline constexpr uint32_t kFlatId = 0;
+/// Flatten::kStill: what changed within so many commits is not built into a new common BVH, because it may go on so.
+inline constexpr uint32_t kQuietCommits = 8;
+/// Flatten::kStill: larger meshes have a BVH of their own from the beginning, so that their first move is instant, too.
+inline constexpr size_t kMostStillTriangles = 100'000;
 
 struct RayCaster::State {
   RTCDevice device = nullptr;
@@ -46,6 +51,8 @@ struct RayCaster::State {
   std::unordered_map<Handle, std::unique_ptr<MeshBvh>> meshes;
   std::vector<PlacedGeometry> places;
   uint64_t flat_triangles = 0;  // when the common BVH was built
+  uint32_t flat_commits = kQuietCommits;
+  bool flat_chosen = false;  // a common BVH was looked for in this mode
   Options options;
   std::atomic<int64_t> device_bytes{0};
   std::mutex error_lock;
@@ -63,7 +70,8 @@ struct RayCaster::State {
   void build_meshes(const Scene&, const std::set<Handle>& rebuild, const std::set<Handle>& refit);
 
   // bvh_build.cpp
-  void choose_flat(const Scene&, const std::set<Handle>& changed, std::vector<bool>& is_flat);
+  void choose_flat(const Scene&, const std::set<Handle>& replaced, const std::set<Handle>& changed,
+                   std::vector<bool>& is_flat);
   void drop_flat();
   void build_flat(const Scene&, const std::vector<bool>& is_flat);
   void place_instances(const Scene&, const std::vector<bool>& is_flat, const std::set<Handle>& changed);

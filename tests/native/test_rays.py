@@ -253,6 +253,25 @@ def test_what_changes_leaves_the_common_bvh_at_once(ag) -> None:
     assert min(edits) < 0.05 * first
 
 
+def test_dragging_most_of_a_scene_rebuilds_nothing(ag) -> None:
+    """commit("still"): the common BVH loses most of its triangles at the first move; what moves must not come back into a
+    new one at the next."""
+    large, small = sphere(128, 256), sphere(8, 16)
+    scene = ag.Scene()
+    handle = scene.add_instances(scene.add_mesh(name="large", positions=large[0], triangles=large[1]), np.eye(4), name="large")
+    for i in range(3):
+        mesh = scene.add_mesh(name="small", positions=small[0], triangles=small[1])
+        scene.add_instances(mesh, at(x=4.0 * (i + 1)), name="small")
+    first = scene.commit("still")["seconds"]
+    drags = []
+    for step in range(1, 30):
+        scene.set_transforms(handle, at(z=0.5 * step)[None])
+        drags.append(scene.commit()["seconds"])
+        hit = scene.intersect([[0.01, 0.01, 99.0], [4.01, 0.01, 99.0]], [[0, 0, -1.0], [0, 0, -1.0]])
+        assert np.allclose(hit["distance"], [98.0 - 0.5 * step, 98.0], atol=0.01)
+    assert np.median(drags[1:]) < 0.05 * first
+
+
 def test_non_finite_rays_hit_nothing(ag) -> None:
     scene = ag.Scene()
     scene.add_instances(square(scene), at(), name="o")
