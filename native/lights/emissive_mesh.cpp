@@ -24,6 +24,19 @@ bool triangle_by_angle(const Vec3& a, const Vec3& b, const Vec3& c, float& angle
   return angle > kMinTriangleAngle && angle < kMaxTriangleAngle;
 }
 
+Vec3 normal_of(const Vec3& b, const Vec3& c) {
+  const glm::dvec3 n = glm::cross(glm::dvec3(b), glm::dvec3(c));
+  const double length = glm::length(n);
+  return length > 0.0 ? Vec3(n / length) : Vec3(0.0f);
+}
+
+/// A shadow ray must end before the light's own face, however flat it comes in: by the face's rounding along its
+/// normal, and by what the ray's direction is rounded.
+Vec3 margin_of(const EmissivePatch& t, const Vec3& direction, float distance) {
+  const float step = t.error + 1e-6f * distance;
+  return glm::dot(t.normal, direction) > 0.0f ? -step * t.normal : step * t.normal;
+}
+
 /// Area times cosine.
 float projected_area(const EmissivePatch& t, const Vec3& direction) {
   return (t.rectangle() ? 1.0f : 0.5f) * std::fabs(glm::dot(glm::cross(t.edge_b, t.edge_c), direction));
@@ -56,6 +69,10 @@ bool make_patch(const Scene& scene, const Materials& materials, const InstanceRe
              c = record.to_world.point(mesh.positions[v[2]]);
   if (!is_finite(a) || !is_finite(b) || !is_finite(c)) return false;
   patch.a = a, patch.edge_b = b - a, patch.edge_c = c - a;
+  const Vec3 n = normal_of(patch.edge_b, patch.edge_c),
+             bound = glm::max(glm::abs(a), glm::max(glm::abs(b), glm::abs(c)));
+  patch.normal = n;
+  patch.error = rounding_error(n, bound + glm::abs(record.to_world.p), patch.edge_b, patch.edge_c);
   patch.instance = instance, patch.triangle = t;
   return true;
 }
@@ -130,6 +147,7 @@ bool sample_patch(const EmissivePatch& t, const Vec3& position, const Vec3& norm
   if (!(d2 > 0.0f)) return false;
   out.distance = std::sqrt(d2);
   out.direction = to_point / out.distance;
+  out.margin = margin_of(t, out.direction, out.distance);
   if (out.density > 0.0f) return true;
   const float projected = projected_area(t, out.direction);
   if (!(projected > 0.0f)) return false;

@@ -15,6 +15,8 @@ namespace afterglow {
 /// A triangle a, a + edge_b, a + edge_c, or the rectangle over both edges.
 struct EmissivePatch {
   Vec3 a, edge_b, edge_c;  // world, relative to Scene::origin()
+  Vec3 normal{0.0f};       // unit, of the face
+  float error = 0.0f;      // how far along the normal its points may lie from where a ray meets them
   uint32_t instance = kNone, material = 0;
   uint32_t triangle = kNone,
            second = kNone;  // of the mesh; second: the rectangle's other half, beyond the diagonal b c
@@ -27,6 +29,7 @@ struct PatchSample {
   Vec3 direction{0.0f};
   float distance = 0.0f;
   float density = 0.0f;
+  Vec3 margin{0.0f};  // as in LightSample
   uint32_t triangle = kNone;
   Vec2 barycentric{0.0f};  // of the triangle's second and third corner
 };

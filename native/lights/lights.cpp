@@ -226,6 +226,7 @@ bool Lights::State::sample_finite(uint32_t light, const Vec3& position, const Ve
   if (!sample_patch(t, position, normal, u, s)) return false;
   out.direction = s.direction, out.distance = s.distance, out.density = s.density;
   out.radiance = emission_of(t, position, s);
+  out.margin = s.margin;
   out.visibility = scene->instances()[t.instance].visibility;
   return true;
 }

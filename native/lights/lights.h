@@ -15,6 +15,7 @@ struct LightSample {
   float distance = kInfinity;
   Rgb radiance{0.0f};    // arriving, unoccluded; delta lights: irradiance on a facing plane
   float density = 0.0f;  // solid angle (delta: discrete), selection included
+  Vec3 margin{0.0f};     // a light that is a surface: step off it, from the sampled point to where a shadow ray ends
   bool delta = false;    // cannot be hit by a BSDF sample: no MIS
   bool cast_shadow = true;
   uint32_t visibility = kVisibleAll;  // of the light, to kinds of rays

@@ -76,6 +76,13 @@ Vec2 active_uv(const Mesh& mesh, const SurfacePoint& at) {
 
 }  // namespace
 
+float rounding_error(const Vec3& face_normal, const Vec3& bound, const Vec3& e1, const Vec3& e2) {
+  // The next ray's own test rounds relative to its triangle's size, even where the plane is exact (z = 0).
+  const Vec3 edges = glm::max(glm::abs(e1), glm::abs(e2));
+  const float size = std::max(edges.x, std::max(edges.y, edges.z));
+  return kRoundings * kEpsilon * (glm::dot(glm::abs(face_normal), bound) + 0.25f * size);
+}
+
 SurfacePoint surface_point(const Scene& scene, const Ray& ray, const Hit& hit, bool with_uv) {
   const InstanceRecord& record = scene.instances()[hit.instance];
   const Mesh& mesh = *record.mesh;
@@ -104,10 +111,7 @@ SurfacePoint surface_point(const Scene& scene, const Ray& ray, const Hit& hit, b
   const Affine& m = record.to_world;
   const Vec3 bound = glm::abs(m.x) * terms.x + glm::abs(m.y) * terms.y + glm::abs(m.z) * terms.z + glm::abs(m.p) +
                      glm::abs(point.position);
-  // The next ray's own test rounds relative to its triangle's size, even where the plane is exact (z = 0).
-  const Vec3 edges = glm::max(glm::abs(m.vector(e1)), glm::abs(m.vector(e2)));
-  const float size = std::max(edges.x, std::max(edges.y, edges.z));
-  point.error = kRoundings * kEpsilon * (glm::dot(glm::abs(point.face_normal), bound) + 0.25f * size);
+  point.error = rounding_error(point.face_normal, bound, m.vector(e1), m.vector(e2));
 
   point.backfacing = glm::dot(point.face_normal, ray.direction) > 0.0f;
   point.normal = smooth_normal(record, mesh, point, vertex);

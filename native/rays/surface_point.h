@@ -30,6 +30,10 @@ Vec2 surface_uv(const Scene&, const SurfacePoint&);
 /// The dense material index at a hit, without the facts that cost more.
 uint32_t material_at(const Scene&, const Hit&);
 
+/// How far along its normal a point of a face may be from where a ray meets it. bound: sum of the magnitudes of all
+/// terms that its position is made of; e1, e2: edges in world space.
+float rounding_error(const Vec3& face_normal, const Vec3& bound, const Vec3& e1, const Vec3& e2);
+
 /// A ray's start beyond self-intersection on the side that `direction` leaves to. The error bound covers the transform.
 Vec3 offset_origin(const SurfacePoint&, const Vec3& direction);
 

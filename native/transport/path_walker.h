@@ -33,10 +33,21 @@ struct WalkScene {
 /// Share of light that a shadow ray brings through transparent surfaces; 0 where an opaque one stands.
 Rgb transmittance(const WalkScene&, Ray, const PathContext&, RayCounts&);
 
-/// End of a shadow ray: a little before its light, which may be a surface itself.
-inline float shadow_end(const Vec3& origin, float distance) {
-  const float reach = max_component(glm::abs(origin));
-  return std::isfinite(distance) ? glm::max(0.0f, distance * (1.0f - 2e-5f) - 1e-6f * reach) : distance;
+/// From a surface to a light, neither of which the ray may meet: it begins and ends off them, so that its direction is
+/// not quite the sample's where the light stands close before the surface. Lamps have no surface, but often lie in one.
+inline Ray shadow_ray(const SurfacePoint& from, const LightSample& light) {
+  Ray ray;
+  ray.origin = offset_origin(from, light.direction);
+  ray.direction = light.direction;
+  ray.t_max = light.distance;
+  ray.mask = kVisibleShadow;
+  if (!std::isfinite(light.distance)) return ray;
+  const Vec3 way = light.direction * light.distance + light.margin - (ray.origin - from.position);
+  ray.t_max = glm::length(way);
+  if (ray.t_max > 0.0f) ray.direction = way / ray.t_max;
+  if (light.margin == Vec3(0.0f))
+    ray.t_max = glm::max(0.0f, ray.t_max * (1.0f - 2e-5f) - 1e-6f * max_component(glm::abs(ray.origin)));
+  return ray;
 }
 
 template <uint32_t kFeatures>
@@ -219,11 +230,7 @@ class Walker {
     const float weight = light.delta ? 1.0f : power_heuristic(light.density, value.density * scatter_share);
     Rgb arriving = light.radiance * (weight / light.density);
     if (light.cast_shadow) {
-      Ray ray;
-      ray.origin = offset_origin(point, light.direction);
-      ray.direction = light.direction;
-      ray.t_max = shadow_end(ray.origin, light.distance);
-      ray.mask = kVisibleShadow;
+      const Ray ray = shadow_ray(point, light);
       counts_.shadow++;
       visitor.traced(ray, true);
       if constexpr (kStraight) {

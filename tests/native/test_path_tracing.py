@@ -45,6 +45,26 @@ def test_parallel_square_lights_a_point_by_its_form_factor() -> None:
     assert error < 0.01 * expected
 
 
+@pytest.mark.parametrize("height", [0.01, 0.1])
+@pytest.mark.parametrize("kind", ["mesh", "area"])
+def test_a_lamp_close_above_a_surface_lights_it(kind: str, height: float) -> None:
+    """Its light comes in so flat that a shadow ray's rounding must neither reach the lamp's own face nor miss it."""
+    scene = one_quad(diffuse((0.5, 0.5, 0.5)), angle=0.01)
+    half, x = 0.25, 1.0
+    if kind == "mesh":
+        scene.materials["lamp"] = emission(3.0)
+        corners = [(x - half, -half, height), (x - half, half, height), (x + half, half, height), (x + half, -half, height)]
+        scene.add("Lamp", quad(*corners), "lamp")
+    else:
+        scene.lights.append(Light("Lamp", "area", translate((x, 0, height)), 3.0 * math.pi * 4 * half**2, size=(2 * half, 2 * half)))
+    grid = (np.arange(400) + 0.5) / 400 * 2 * half - half
+    distance2 = (x + grid[:, None]) ** 2 + grid**2 + height**2
+    expected = 0.5 / math.pi * 3.0 * 4 * half**2 * float((height**2 / distance2**2).mean())
+    value, error = mean(scene, samples=256, size=8, max_bounces=0)
+    assert abs(value - expected) < 4 * error + 2e-3 * expected
+    assert error < 0.02 * expected
+
+
 @pytest.mark.parametrize("albedo", [0.0, 0.3, 0.8])
 @pytest.mark.parametrize("bounces", [0, 1, 3])
 def test_bounce_limit_cuts_the_furnace_series(albedo: float, bounces: int) -> None:
