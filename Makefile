@@ -7,18 +7,23 @@ Convenience targets: each sets up what it needs (Debian packages through tools/s
 
   make              Build the native module and build/blender.
   make build        The same. PRESET=debug|asan|tsan chooses another preset of CMakePresets.json.
-  make debug        make build PRESET=debug
+  make release, make debug
+                    make build PRESET=release, PRESET=debug
+  make native       The module alone.
 
 Rendering
   make demo         Render blend_files/cornell_box.blend in Blender: build/demo/cornell_box.png.
                     FILE=path.blend   another file          SAMPLES=n   at most n samples
-  build/blender …   Blender with the add-on enabled; your settings stay untouched. BLENDER=path: another Blender.
+  build/blender …   Blender with the add-on enabled; your settings stay untouched. BLENDER=path: another Blender (for
+                    Blender's own builds `make package` first: they need the module made for them).
 
 Testing
   make test         Everything: the native module, Debian's Blender (background and window), the package in official
                     Blender 4.5 LTS and 5.0. TESTS=tests/native chooses, PYTEST_ARGS="-k film" goes to pytest.
   make test-quick   The same without the tests marked slow.
-  make test-blenders  Also official 4.2 LTS, and windows in Debian's 4.3.2 and 5.2.2 (root; about 6 GB under build/roots).
+  make test-blenders
+                    Also official 4.2 LTS, and windows in Debian's 4.3.2 and 5.2.2 (root; about 6 GB under build/roots).
+                    BLENDERS_ARGS="--only debian --suites sid" runs a part.
   make asan         The native tests with the address and undefined-behaviour sanitizers.
   make tsan         The native tests with the thread sanitizer.
 
@@ -28,10 +33,11 @@ Figures
 Shipping
   make package      build/package/afterglow-<version>-linux-x64.zip (extension for official Blender 4.2 LTS to 5.0)
                     and afterglow-legacy-<version>.zip (Debian's 3.4.1).
+  make venvs        Official Blenders as Python modules, from PyPI: build/venvs. VERSIONS="4.5 5.0": these alone.
 
 Other
   make format       clang-format (and ruff, where it is installed) over the own sources.
-  make clean        Remove what was built; downloads and Blender's venvs stay. make distclean: remove them, too.
+  make clean        Remove what was built; downloads, Blender's venvs and the roots stay. make distclean: them, too.
   make help         This text.
 
 endef
@@ -51,7 +57,7 @@ BUILD := build/$(PRESET)
 PYTEST = AFTERGLOW_PRESET=$(PRESET) $(PYTHON) -m pytest
 
 .DEFAULT_GOAL := build
-.PHONY: build debug release setup native demo test test-quick test-blenders asan tsan bench package venvs format clean distclean help
+.PHONY: build debug release native demo test test-quick test-blenders asan tsan bench package venvs format clean distclean help
 
 build: native build/blender
 
@@ -122,7 +128,8 @@ format:
 	@if command -v ruff >/dev/null; then ruff format . && ruff check --fix .; else echo "ruff is not installed: Python left as it is"; fi
 
 clean:
-	rm -rf build/release build/debug build/asan build/tsan build/official build/demo build/scripts build/blender build/bench build/package
+	rm -rf build/release build/debug build/asan build/tsan build/trixie build/sid build/official build/demo build/scripts build/blender \
+		build/blenders build/bench build/package
 
 distclean:
 	@if mount | grep -q "$(ROOT)/build/"; then echo "something is mounted below build/: unmount it first"; exit 1; fi
