@@ -86,12 +86,16 @@ def render_layer(
     seconds = {"sync": time.perf_counter() - started}
     if engine.test_break():
         return
+    wanted = list(passes.wanted(depsgraph.view_layer)) if not engine.is_preview else [passes.COMBINED]
+    if bpy.app.background and not persistent and not engine.is_preview:
+        # All is read. Blender's evaluated copies are as large as ours; in the interface they are still wanted.
+        engine.free_blender_memory()
+        del depsgraph
     engine.update_stats("", prefix + "Building the scene")
     changes = native.scene.commit(flatten=True)
     seconds["commit"] = time.perf_counter() - started - seconds["sync"]
     warnings = native.take_warnings() + list(view.warnings) + list(changes["warnings"])
 
-    wanted = list(passes.wanted(depsgraph.view_layer)) if not engine.is_preview else [passes.COMBINED]
     settings = session_settings(scene, viewport=False)
     if engine.is_preview:
         settings.update(PREVIEW_SETTINGS)

@@ -8,6 +8,7 @@ import bpy
 
 from . import backend
 from .sync import SceneSync
+from .sync.scene import weakly
 
 
 class NativeScene:
@@ -17,7 +18,7 @@ class NativeScene:
         self.warnings: list[str] = []
         self.depsgraph = 0
         self.scene = backend.afterglow.Scene()
-        self.sync = SceneSync(self.scene, self.log)
+        self.sync = SceneSync(self.scene, weakly(self.log))
 
     def log(self, level: str, text: str) -> None:
         if level == "warning":

@@ -308,3 +308,29 @@ def test_cancel_is_obeyed_within_50_ms(in_blender: Run, box: Path) -> None:
     delays = sorted(found["delays"])
     assert delays[len(delays) // 2] < 0.05, delays
     assert delays[-1] < 0.25, delays  # a busy machine may be late once
+
+
+def test_nothing_of_a_render_stays_in_memory(in_blender: Run, box: Path) -> None:
+    """The native scene goes with the render, not with Python's next search for cycles."""
+    found = in_blender(
+        """
+        import gc, weakref
+        made, native_scene = [], addon('native_scene')
+        first = native_scene.NativeScene.__init__
+        def init(self):
+            first(self)
+            made.extend(weakref.ref(part) for part in (self, self.sync, self.sync.objects, self.sync.materials))
+        native_scene.NativeScene.__init__ = init
+        gc.disable()
+        s = scene(samples=1)
+        one, two = render(), render()
+        alive = [str(ref()) for ref in made if ref() is not None]
+        s.render.use_persistent_data = True
+        render()
+        kept = sum(ref() is not None for ref in made)
+        result(made=len(made), alive=alive, kept=kept, difference=np.abs(one - two).max())
+        """,
+        box,
+    )
+    assert found["alive"] == [] and found["made"] == 12
+    assert found["kept"] == 4 and found["difference"] == 0

@@ -8,6 +8,7 @@ deletions are not reported at all.
 from __future__ import annotations
 
 import time
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -99,6 +100,19 @@ def read_updates(depsgraph: Any, everything: bool) -> Updates:
     return updates
 
 
+def weakly(method: Callable[..., None]) -> Callable[..., None]:
+    """The method without its object's life: a scene whose parts point back to it would stay in memory, meshes and all,
+    until Python looks for cycles."""
+    reference = weakref.WeakMethod(method)
+
+    def call(*arguments: Any) -> None:
+        found = reference()
+        if found is not None:
+            found(*arguments)
+
+    return call
+
+
 class SceneSync:
     """Fills one native `Scene`. `log(level, text)` takes each new warning once, level "warning" or "info".
 
@@ -108,8 +122,8 @@ class SceneSync:
         self.scene, self.log = scene, log
         self.said: set[str] = set()
         self.report = SyncReport()
-        self.materials = MaterialTable(scene, self.warn)
-        self.objects = ObjectTable(scene, self.materials, self.warn)
+        self.materials = MaterialTable(scene, weakly(self.warn))
+        self.objects = ObjectTable(scene, self.materials, weakly(self.warn))
         self.world: bytes | None = None
         self.world_images: set[int] = set()
         self.shading: Any = None
