@@ -28,7 +28,8 @@ Testing
   make tsan         The native tests with the thread sanitizer.
 
 Figures
-  make bench        Every figure that the project promises: build/bench/*.json, *.svg and a table. NAME=foundation: one set.
+  make bench        Every figure that the project promises: build/bench/*.json, *.svg and a table. NAME=foundation: one set;
+                    FIGURE=memory: one figure of it.
 
 Shipping
   make package      build/package/afterglow-<version>-linux-x64.zip (extension for official Blender 4.2 LTS to 5.0)
@@ -48,6 +49,7 @@ FILE ?= blend_files/cornell_box.blend
 TESTS ?= tests/native tests/blender
 PYTEST_ARGS ?=
 NAME ?=
+FIGURE ?=
 SAMPLES ?=
 
 # The distribution's Python is the one that its Blender runs; the first on PATH may be another.
@@ -109,10 +111,10 @@ asan tsan:
 	@$(MAKE) --no-print-directory native PRESET=$@
 	@tools/sanitized.sh $@ $(PYTHON) -m pytest -p no:cacheprovider $(PYTEST_ARGS) $(if $(filter command line,$(origin TESTS)),$(TESTS),tests/native)
 
-bench: 
+bench:
 	@tools/setup.sh test
 	@$(MAKE) --no-print-directory build PRESET=release
-	@PYTHONPATH=$(ROOT)/build/release/python $(PYTHON) -m afterglow bench $(NAME) --output build/bench
+	@PYTHONPATH=$(ROOT)/build/release/python $(PYTHON) -m afterglow bench $(NAME) $(FIGURE:%=--figure %) --output build/bench
 
 package:
 	@tools/setup.sh package

@@ -23,7 +23,9 @@ def parser() -> argparse.ArgumentParser:
     bench = commands.add_parser("bench", help="the figures that the project promises")
     bench.add_argument("name", nargs="*", help="sets of figures, of all when none is named")
     bench.add_argument("--output", default="build/bench", help="folder of the JSON files and charts (build/bench)")
-    bench.add_argument("--only", action="append", default=[], help="only figures whose name contains this")
+    bench.add_argument("--figure", "--only", action="append", default=[], metavar="KEY",
+                       help="only the figures of this key, or of those that contain it; may be given several times")
+    bench.add_argument("--list", action="store_true", help="list the keys and end")
     bench.add_argument("--pairs", type=int, default=5, help="alternating pairs of a ratio (5)")
 
     render = commands.add_parser("render", help="render a procedural scene to a file")

@@ -3,7 +3,7 @@
 
 blender -b --python blender_server.py -- FD FOLDER: answers go to the file descriptor FD as lines of JSON, images to FOLDER.
 Jobs: {"op": "open", "file", "percent"}, {"op": "render", "engine", "settings", "multilayer", "out"}, {"op": "memory"},
-{"op": "grid", "triangles"}, {"op": "save", "file"}. Started by `afterglow.blenders`; what Blender prints stays on standard output.
+{"op": "grid", "triangles"}, {"op": "save", "file"}, {"op": "script", "file", "arguments"}. Started by `afterglow.blenders`; what Blender prints stays on standard output.
 """
 
 import json
@@ -102,15 +102,40 @@ def render(job: dict, folder: str, number: int) -> dict:
     path = job.get("out") or os.path.join(folder, f"image_{number}.exr")
     scene.render.use_file_extension = False
     scene.render.filepath = path
+    stages = []
     start = time.perf_counter()
-    bpy.ops.render.render(write_still=True)
-    seconds = time.perf_counter() - start
+
+    def heard(*words: object) -> None:  # older Blenders give no words
+        stages.append((time.perf_counter() - start, str(words[0]) if words and isinstance(words[0], str) else ""))
+
+    bpy.app.handlers.render_stats.append(heard)
+    try:
+        bpy.ops.render.render(write_still=True)
+        seconds = time.perf_counter() - start
+    finally:
+        bpy.app.handlers.render_stats.remove(heard)
     statistics = {}
     if engine == "AFTERGLOW":
         import afterglow
 
         statistics = {k: v for k, v in afterglow.statistics(scene).items() if k != "passes_log"}
-    return {"image": path, "seconds": seconds, "statistics": statistics}
+    return {"image": path, "seconds": seconds, "statistics": statistics, "stages": stages[:1000]}
+
+
+def script(job: dict) -> dict:
+    """Runs a program that was written to be Blender's only one."""
+    import runpy
+
+    before = sys.argv
+    sys.argv = [job["file"], *job["arguments"]]
+    try:
+        runpy.run_path(job["file"], run_name="__main__")
+    except SystemExit as ended:
+        if ended.code not in (None, 0):
+            raise RuntimeError(f"{job['file']} ended with {ended.code}") from ended
+    finally:
+        sys.argv = before
+    return {}
 
 
 def memory() -> dict:
@@ -183,6 +208,8 @@ def main() -> None:
                 result = {}
             elif kind == "memory":
                 result = memory()
+            elif kind == "script":
+                result = script(job)
             else:
                 raise ValueError(f"no job {kind!r}")
         except Exception as error:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import select
 import subprocess
 import sys
 import tempfile
@@ -45,6 +46,19 @@ def shared() -> Path:
     if not folder.is_dir():
         raise Unavailable(f"{folder} is absent: name the folder of shared scenes and tools in AFTERGLOW_SHARED")
     return folder
+
+
+def shared_scenes() -> Path:
+    """AFTERGLOW_SCENES, as for the tests, or the scenes in shared()."""
+    named = os.environ.get("AFTERGLOW_SCENES")
+    return Path(named) if named else shared() / "scenes"
+
+
+def shared_tool(name: str) -> Path:
+    tool = shared() / "tools" / name
+    if not tool.is_file():
+        raise Unavailable(f"{tool} is absent")
+    return tool
 
 
 def debian() -> list[str]:
@@ -114,15 +128,18 @@ class Worker:
         self.problem: str = hello["problem"]
 
     @classmethod
-    def of_debian(cls) -> Worker:
-        return cls([*debian(), "-b", "--python-exit-code", "1", "--python", str(SCRIPT)])
+    def of_debian(cls, *arguments: str) -> Worker:
+        return cls([*debian(), "-b", *arguments, "--python-exit-code", "1", "--python", str(SCRIPT)])
 
     @classmethod
     def of_official(cls, version: str = "5.0", addon: bool = True) -> Worker:
         environment = {"BLENDER_USER_RESOURCES": str(resources(version))} if addon else {}
         return cls([str(official(version)), str(SCRIPT)], environment)
 
-    def _answer(self) -> dict[str, Any]:
+    def _answer(self, timeout: float | None = None) -> dict[str, Any]:
+        if timeout is not None and not select.select([self.answers], [], [], timeout)[0]:
+            self.process.kill()
+            raise WorkerError(f"Blender was ended: no answer within {timeout:g} s")
         line = self.answers.readline()
         if not line:
             words = self.log.read_text(errors="replace")[-2500:] if self.log.is_file() else ""
@@ -132,14 +149,18 @@ class Worker:
             raise WorkerError(result["error"])
         return result
 
-    def job(self, op: str, **values: Any) -> dict[str, Any]:
+    def job(self, op: str, *, timeout: float | None = None, **values: Any) -> dict[str, Any]:
         assert self.process.stdin is not None
         try:
             self.process.stdin.write(json.dumps({"op": op, **values}) + "\n")
             self.process.stdin.flush()
         except BrokenPipeError:
             pass  # the answer that is missing says more
-        return self._answer()
+        return self._answer(timeout)
+
+    def printed(self, since: int = 0) -> str:
+        """What Blender printed, from a length on that an earlier call gave."""
+        return self.log.read_bytes()[since:].decode(errors="replace")
 
     def open(self, file: str | Path, percent: float = 100) -> dict[str, Any]:
         """Resolution, frame and the settings that the file has."""
@@ -147,7 +168,8 @@ class Worker:
 
     def render(self, engine: str = "AFTERGLOW", *, as_references: bool = True, multilayer: bool = False, out: str | None = None,
                **settings: Any) -> dict[str, Any]:
-        """{"image": path, "seconds": of the whole render from the opened file, "statistics"}."""
+        """{"image": path, "seconds": of the whole render from the opened file, "statistics", "stages": [(second, what the
+        engine said of itself), …]}."""
         return self.job("render", engine=engine, as_references=as_references, multilayer=multilayer, out=out, settings=settings)
 
     def close(self) -> None:

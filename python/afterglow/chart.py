@@ -142,7 +142,8 @@ def bars(title: str, rows: Sequence[tuple[str, float, float | None, bool | None]
     """Rows (name, value over goal, its spread or None, holds or None) as bars on a logarithmic axis; 1 is the goal."""
     height = TOP + 34 * len(rows) + BOTTOM
     low, high = _range([0.5, 2.0, *(v for _, v, _, _ in rows if v > 0)], True)
-    axis = Axis(low, high, 250, WIDTH - RIGHT)
+    left = max(250, 12 + round(6.2 * max((len(name) for name, *_ in rows), default=0)))
+    axis = Axis(low, high, left, left + WIDTH - 250 - RIGHT)
     body = []
     for tick in axis.ticks:
         body.append(f'<path d="M{axis.at(tick):.1f} {TOP}V{height - BOTTOM}" stroke="#ddd"/>')
@@ -155,10 +156,10 @@ def bars(title: str, rows: Sequence[tuple[str, float, float | None, bool | None]
         if spread:
             a, b = axis.at(max(value - spread, low)), axis.at(value + spread)
             body.append(f'<path d="M{a:.1f} {y + 9}H{b:.1f}" stroke="#222" stroke-width="1.5"/>')
-        body.append(_text(244, y + 13, name, "end", 11))
+        body.append(_text(left - 6, y + 13, name, "end", 11))
     body.append(f'<path d="M{axis.at(1.0):.1f} {TOP - 4}V{height - BOTTOM + 4}" stroke="#222" stroke-width="1.5"/>')
     body.append(_text(axis.at(1.0), height - 18, "goal = 1, right of it is better", size=12))
-    return _frame(title, body, height=height)
+    return _frame(title, body, height=height, width=left + WIDTH - 250)
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:

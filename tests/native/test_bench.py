@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The arithmetic of figures: goals, pairs, crossings, deviations of means."""
+"""The arithmetic of figures: goals, pairs, the fewest samples, deviations of means; what the bench writes."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
-from afterglow import cache
-from afterglow.bench.figure import Figure, Pairs, alternate
-from afterglow.bench.foundation.kitchen import crossing
-from afterglow.bench.foundation.light_passes import compare
+from afterglow import bench, blenders, cache
+from afterglow.bench.figure import Context, Figure, Pairs, alternate, table
+from afterglow.bench.foundation.kitchen import fewest
+from afterglow.bench.foundation.light_passes import compare, describe
+from afterglow.bench.foundation.sync import staged
 
 
 @pytest.mark.parametrize(("goal", "value", "holds", "margin"), [
@@ -42,10 +45,73 @@ def test_the_spread_is_that_of_a_median() -> None:
     assert np.mean(spreads) == pytest.approx(np.std(medians), rel=0.25)
 
 
-def test_crossing() -> None:
-    assert crossing([(1, 0.1), (10, 0.001)], 0.01) == pytest.approx(10**0.5)
-    assert crossing([(2, 0.001)], 0.01) == 2
-    assert crossing([(1, 0.1), (2, 0.05)], 0.01) == math.inf
+@pytest.mark.parametrize(("needed", "found"), [(1, 1), (3, 3), (4, 4), (7, 8), (16, 16), (17, None)])
+def test_the_fewest_samples(needed: int, found: int | None) -> None:
+    tried: list[int] = []
+    assert fewest((1, 2, 3, 4, 8, 16), 4, lambda n: (tried.append(n), n >= needed)[1]) == found
+    assert len(tried) == len(set(tried)) and tried[0] == 4
+
+
+def test_stages_tell_what_synchronizing_took() -> None:
+    stages = [[0.1, "Synchronizing object | Sun"], [0.2, "Synchronizing object | Sheet"], [0.7, "Initializing"], [0.9, "Updating"]]
+    assert staged(stages) == pytest.approx(0.6)
+    assert staged([[0.1, ""], [0.2, ""]]) is None and staged([]) is None
+
+
+def test_figures_are_written_as_promised(tmp_path: Path) -> None:
+    """Ten columns, booleans and null where JSON wants them; numpy's numbers and infinities come out as JSON has them."""
+    figures = [Figure("a", "s", np.float32(2), "ms", "p", 4.0, 0.5, "≤ 1", spread=0.1, details={"x": np.arange(2)}).judged(),
+               Figure("b", "s", math.inf, goal="≤ 1").judged(), Figure("c", "", holds=False, note="not measured: no Xvfb")]
+    path = bench.write("some", figures, tmp_path, {"machine": {"cores": 2}, "versions": {"afterglow": "1"}})
+
+    def no_constants(text: str) -> None:
+        raise AssertionError(f"{text} is not JSON")
+
+    data = json.loads(path.read_text(), parse_constant=no_constants)
+    assert data["machine"] == {"cores": 2} and set(data) == {"machine", "versions", "figures"}
+    assert all(list(f) == ["figure", "scene", "value", "unit", "peer", "peer_value", "ratio", "goal", "holds", "command"]
+               for f in data["figures"])
+    assert [f["holds"] for f in data["figures"]] == [True, False, False]
+    assert data["figures"][1]["value"] is None
+    details = json.loads((tmp_path / "some_details.json").read_text(), parse_constant=no_constants)
+    assert details["figures"][0]["spread"] == 0.1 and details["figures"][0]["details"] == {"x": [0, 1]}
+    assert (tmp_path / "some.svg").read_text().startswith("<svg")
+    text = table(figures)
+    assert "yes" in text and "not measured: no Xvfb" in text
+
+
+def test_figures_are_chosen_by_key() -> None:
+    assert bench.chosen("foundation", []) == list(bench.SETS["foundation"])
+    assert bench.chosen("foundation", ["kitchen_error", "memory"]) == ["kitchen_error", "memory"]
+    assert bench.chosen("foundation", ["ray"]) == ["rays"]
+    with pytest.raises(KeyError, match="no figure 'colour'"):
+        bench.chosen("foundation", ["colour"])
+
+
+def test_one_failing_figure_does_not_end_the_bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unavailable(_: Context) -> list[Figure]:
+        raise blenders.Unavailable("nothing here")
+
+    def broken(_: Context) -> list[Figure]:
+        raise ZeroDivisionError("by zero")
+
+    def fine(_: Context) -> list[Figure]:
+        return [Figure("fine", "s", 1.0, goal="≤ 1").judged()]
+
+    monkeypatch.setitem(bench.SETS, "some", {"unavailable": unavailable, "broken": broken, "fine": fine})
+    said: list[str] = []
+    lengths: list[int] = []
+    figures = bench.run("some", Context(tmp_path, say=said.append), ["unavailable", "broken", "fine"], lambda f: lengths.append(len(f)))
+    assert [f.holds for f in figures] == [False, False, True] and lengths == [1, 2, 3]
+    assert "nothing here" in figures[0].note and "ZeroDivisionError" in figures[1].note
+    assert figures[2].command == "make bench NAME=some FIGURE=fine"
+    assert any(line.startswith("[2/3] broken") for line in said)
+
+
+def test_the_worst_pass_is_described() -> None:
+    assert "-2.00 %" in describe("DiffDir", {"DiffDir": {"ours": 0.98, "cycles": 1.0, "resolved": 0.1}})
+    assert "noise" in describe("DiffDir", {"DiffDir": {"ours": 0.98, "cycles": 1.0, "resolved": 1.1}})
+    assert "absent" in describe("Emit", {"Emit": "absent"})
 
 
 def test_means_are_compared_beyond_three_standard_errors() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One measured figure, and the ways of measuring that all share: alternating pairs, their median and spread."""
+"""One measured figure, and what all share: alternating pairs, their median and spread, the table."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import statistics
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from .. import chart
 
 
 @dataclass
@@ -34,8 +36,10 @@ class Figure:
         sign, number = self.goal.split()
         actual = self.ratio if self.ratio is not None else self.value
         wanted = float(number)
-        self.holds = actual is not None and math.isfinite(actual) and {
-            "≥": actual >= wanted, "≤": actual <= wanted, "=": actual == wanted}[sign]
+        if actual is None or not math.isfinite(actual):
+            self.holds = False
+        else:
+            self.holds = bool({"≥": actual >= wanted, "≤": actual <= wanted, "=": actual == wanted}[sign])
         return self
 
     def margin(self) -> float | None:
@@ -61,7 +65,8 @@ class Figure:
     def line(self) -> str:
         actual = self.ratio if self.ratio is not None else self.value
         shown = "–" if actual is None else f"{actual:.4g}"
-        return f"{self.title()}: {shown} (goal {self.goal or '–'}) {'holds' if self.holds else self.note or 'MISSED'}"
+        spread = f" ± {self.spread:.2g}" if self.spread else ""
+        return f"{self.title()}: {shown}{spread} (goal {self.goal or '–'}) {'holds' if self.holds else 'MISSED ' + self.note}"
 
 
 @dataclass
@@ -73,12 +78,12 @@ class Context:
     say: Callable[[str], None] = print
 
     def command(self, name: str, key: str) -> str:
-        return f"python3 -m afterglow bench {name} --only {key}"
+        return f"make bench NAME={name} FIGURE={key}"
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """Ratios of alternating pairs; `spread` is the standard error of the median's neighbourhood (MAD-based)."""
+    """Ratios of alternating pairs; `spread` is the standard error of their median."""
 
     ours: list[float]
     theirs: list[float]
@@ -94,9 +99,13 @@ class Pairs:
     @property
     def spread(self) -> float:
         """1.25 · σ / √n with σ = 1.48 · MAD: the standard error of a median of nearly normal values."""
-        middle = self.median
-        deviation = statistics.median(abs(r - middle) for r in self.ratios)
-        return 1.2533 * 1.4826 * deviation / math.sqrt(len(self.ratios))
+        return spread_of_median(self.ratios)
+
+
+def spread_of_median(values: list[float]) -> float:
+    middle = statistics.median(values)
+    deviation = statistics.median(abs(value - middle) for value in values)
+    return 1.2533 * 1.4826 * deviation / math.sqrt(len(values))
 
 
 def alternate(count: int, ours: Callable[[], float], theirs: Callable[[], float]) -> Pairs:
@@ -107,3 +116,16 @@ def alternate(count: int, ours: Callable[[], float], theirs: Callable[[], float]
         for mine in (True, False) if i % 2 == 0 else (False, True):
             (a if mine else b).append(ours() if mine else theirs())
     return Pairs(a, b)
+
+
+def table(figures: list[Figure]) -> str:
+    """What was measured, for people."""
+    rows: list[tuple[str, ...]] = [("figure", "scene", "value", "peer", "ratio", "goal", "holds")]
+    for f in figures:
+        spread = f" ± {chart.number(f.spread)}" if f.spread else ""
+        ratio = "" if f.ratio is None else chart.number(f.ratio) + spread
+        value = "" if f.value is None else f"{chart.number(f.value)} {f.unit}" + ("" if f.ratio is not None else spread)
+        peer = "" if f.peer_value is None else f"{chart.number(f.peer_value)} ({f.peer})"
+        rows.append((f.figure, f.scene, value, peer, ratio, f.goal, "yes" if f.holds else "NO"))
+    notes = [f"  {f.title()}: {f.note}" for f in figures if f.note]
+    return chart.table(rows) + ("\n\n" + "\n".join(notes) if notes else "") + "\n"

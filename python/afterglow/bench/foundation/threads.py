@@ -22,7 +22,7 @@ def measure(context: Context) -> list[Figure]:
     try:
         file, _ = scene()
     except blenders.Unavailable as reason:
-        context.say(f"  kitchen left out: {reason}")
+        context.say(f"      kitchen left out: {reason}")
         return figures
     with blenders.Worker.of_debian() as worker:
         worker.open(file, 25)
