@@ -24,6 +24,11 @@ Vec3 normalized_or(const DVec3& v, const Vec3& otherwise) {
 /// Share of the light that a spot sends this way: a smooth step in the cosine to its axis, in the object's own space,
 /// so that an uneven scale makes the cone elliptic.
 float spot_attenuation(const Lamp& lamp, const Vec3& from_lamp) {
+  if (lamp.legacy) {
+    const float cosine = glm::dot(from_lamp, lamp.axis);
+    const float t = std::clamp((cosine - lamp.cos_spot) * lamp.inverse_blend, 0.0f, 1.0f);
+    return std::max(cosine, 0.0f) * t * t * (3.0f - 2.0f * t);
+  }
   const Vec3 local = lamp_local(lamp, from_lamp);
   const float x = std::clamp((-local.z - lamp.cos_spot) * lamp.inverse_blend, 0.0f, 1.0f);
   return x * x * (3.0f - 2.0f * x);
@@ -92,7 +97,9 @@ bool make_sun(const Light& light, Lamp& lamp) {
   lamp.one_minus_cos = float(2.0 * std::pow(std::sin(0.5 * half), 2.0));
   lamp.shape = lamp.one_minus_cos > 1e-12f ? LampShape::kCone : LampShape::kDirection;
   const bool cone = lamp.shape == LampShape::kCone;
-  lamp.radiance = light.color * float(cone ? light.power / (M_PI * sine * sine) : double(light.power));
+  // The share of a unit disk's irradiance, or the flat disk's area.
+  const double share = light.version == 1 ? std::pow(std::tan(std::min(half, 1.5706)), 2.0) : sine * sine;
+  lamp.radiance = light.color * float(cone ? light.power / (M_PI * share) : double(light.power));
   lamp.hittable = cone && light.multiple_importance;
   return true;
 }
@@ -253,6 +260,7 @@ std::optional<Lamp> make_lamp(const Light& light, Handle handle, const DVec3& or
   lamp.visibility = light.visibility;
   lamp.cast_shadow = light.cast_shadow;
   lamp.has_graph = light.graph.has_value();
+  lamp.legacy = light.version == 1;
   lamp.position = Vec3(DVec3(m[3]) - origin);
   lamp.axis = normalized_or(-DVec3(m[2]), Vec3(0, 0, -1));
   auto row = [](const DVec3& column, const Vec3& otherwise) {
@@ -286,6 +294,13 @@ std::optional<Lamp> make_lamp(const Light& light, Handle handle, const DVec3& or
   return lamp;
 }
 
+Rgb sun_radiance(const Lamp& lamp, const Vec3& direction) {
+  if (!lamp.legacy) return lamp.radiance;
+  // Before 4.0 directions were chosen evenly over a flat disk before the receiver.
+  const float cosine = std::max(-glm::dot(direction, lamp.axis), 1e-3f);
+  return lamp.radiance / (cosine * cosine * cosine);
+}
+
 bool sample_lamp(const Lamp& lamp, const Vec3& position, const Vec3& normal, const Vec2& u, LampSample& out) {
   out = LampSample{};
   switch (lamp.shape) {
@@ -300,7 +315,7 @@ bool sample_lamp(const Lamp& lamp, const Vec3& position, const Vec3& normal, con
     case LampShape::kCone:
       out.direction = glm::normalize(Frame(-lamp.axis).to_world(square_to_cone(u, lamp.one_minus_cos)));
       out.density = cone_density(lamp.one_minus_cos);
-      out.radiance = lamp.radiance;
+      out.radiance = sun_radiance(lamp, out.direction);
       return true;
     default:
       return sample_round(lamp, position, normal, u, out);
@@ -329,6 +344,7 @@ bool intersect_lamp(const Lamp& lamp, const Vec3& origin, const Vec3& direction,
       const float t = intersect_sphere(origin, direction, lamp.position, lamp.radius, t_min, t_max);
       if (!(t > 0.0f)) return false;
       const bool inside = glm::dot(to_center, to_center) <= lamp.radius * lamp.radius * 1.000001f;
+      if (!inside && glm::dot(t * direction - to_center, direction) > 0.0f) return false;  // leaving: was met before
       hit.t = t, hit.radiance = attenuated(lamp, -direction, inside);
       return !is_black(hit.radiance);
     }

@@ -25,6 +25,7 @@ struct Lamp {
   LampShape shape = LampShape::kPoint;
   bool spot = false, spread = false, has_graph = false, cast_shadow = true;
   bool hittable = false;    // rays can run into it, so that its samples take part in MIS
+  bool legacy = false;      // a spot or sun as Blender before 4.0 had it
   bool orthogonal = false;  // a rectangle's edges are at right angles
   uint32_t visibility = kVisibleAll;
   Handle handle = 0;
@@ -65,6 +66,9 @@ struct LampHit {
 bool intersect_lamp(const Lamp&, const Vec3& origin, const Vec3& direction, float t_min, float t_max, LampHit&);
 /// For a direction that does meet the lamp at distance t.
 float lamp_density(const Lamp&, const Vec3& position, const Vec3& normal, const Vec3& direction, float t);
+
+/// Radiance of a sun towards a direction within its disk, without the graph's factor.
+Rgb sun_radiance(const Lamp&, const Vec3& direction);
 
 /// A direction from the lamp in its local frame, for its graph.
 Vec3 lamp_local(const Lamp&, const Vec3& from_lamp);

@@ -422,7 +422,7 @@ Rgb Lights::escaped_suns(const Vec3& direction, uint32_t ray_visibility, uint32_
   const float weight = sun_weight(sun, normal);
   if (s.shares(position, normal, shares) && weight > 0.0f)
     density = shares.weight[kSuns] * weight / s.suns_weight(normal) * cone_density(sun.one_minus_cos);
-  return s.with_graph(sun, sun.radiance, direction, Vec2(0.0f));
+  return s.with_graph(sun, sun_radiance(sun, direction), direction, Vec2(0.0f));
 }
 
 }  // namespace afterglow

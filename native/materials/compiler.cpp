@@ -359,6 +359,7 @@ Program Emitter::lower() {
     program.code.push_back(instruction);
   }
   program.reads_offsets = reads_offsets;
+  program.offset_scale = offset_scale;
   program.effects |= closure_effects;
   if (too_large) {
     warn("the node tree is too large: it is shown grey");

@@ -74,6 +74,7 @@ class Emitter {
   uint32_t next_register = 0;
   uint32_t current = 0, current_offset = 0;
   bool reads_offsets = false;
+  float offset_scale = 1.0f;
   uint32_t closure_effects = 0;
 
  private:

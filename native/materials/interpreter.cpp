@@ -276,16 +276,21 @@ void execute(const Program& program, const HitContext& hit, Vec3* r, Surface* ou
 
 namespace {
 
-/// Neighbours on the plane of the face, about a pixel of a camera away, with the surface's coordinates continued there.
+/// Neighbours on the plane of the face, a pixel away (or of a camera of a thousand pixels, where the path does not
+/// say), with the surface's coordinates continued there. To both sides of the same axes as in Cycles: forward
+/// differences over a pixel are not the same along others.
 void move_points(HitContext& hit, SurfacePoint moved[2]) {
   const SurfacePoint& p = *hit.points[0];
-  const Frame frame(p.face_normal);
-  const float step = std::fmax(1e-3f * p.t, 2e-5f * glm::length(p.position));
+  const Vec3 n = p.face_normal, across(n.z - n.y, n.x - n.z, n.y - n.x);  // (1, 1, 1) × n
+  const float size = glm::length(across);
+  const Vec3 t = size > 1e-3f ? across / size : Frame(n).t, b = glm::cross(n, t);
+  const float pixel = hit.path && hit.path->footprint > 0.0f ? hit.path->footprint : 1e-3f * p.t;
+  const float step = std::fmax(pixel * hit.offset_scale, 2e-5f * glm::length(p.position));
   const InstanceRecord* record =
       hit.scene && p.instance < hit.scene->instances().size() ? &hit.scene->instances()[p.instance] : nullptr;
   for (int k = 0; k < 2; ++k) {
     moved[k] = p;
-    const Vec3 d = (k == 0 ? frame.t : frame.b) * (step > 0.0f ? step : 1e-4f);
+    const Vec3 d = (k == 0 ? t : b) * (step > 0.0f ? step : 1e-4f);
     moved[k].position += d;
     hit.points[k + 1] = &moved[k];
     if (!record || !record->mesh) continue;
@@ -318,6 +323,7 @@ void run(const Program& program, HitContext& hit, Surface& out) {
   hit.points[1] = hit.points[2] = hit.points[0];
   if (program.reads_offsets && !hit.background) {
     SurfacePoint moved[2];
+    hit.offset_scale = program.offset_scale;
     move_points(hit, moved);
     execute(program, hit, room.registers, &out);
   } else {

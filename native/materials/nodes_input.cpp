@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Input nodes: what a program may read of the hit, the path and the object.
+#include <algorithm>
+
 #include "materials/attributes.h"
 #include "materials/emitter.h"
 
@@ -152,6 +154,8 @@ void bump(Emitter& e) {
   if (e.offset() != 0 || !e.linked("height")) {  // nothing to bend by
     return e.output("normal", Type::kVector, normal.none() ? e.emit(Op::kGeometry, {}, {1, 0}) : normal);
   }
+  // One pair of neighbours serves a whole program: the last bump's width.
+  e.offset_scale = float(std::clamp(e.number("filter_width", 1.0), 1e-3, 1e3));
   e.output("normal", Type::kVector,
            e.emit(Op::kBump,
                   {e.input_at("height", Type::kFloat, 0, 1.0f), e.input_at("height", Type::kFloat, 1, 1.0f),

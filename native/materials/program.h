@@ -103,6 +103,7 @@ struct Program {
   uint32_t effects = 0;  // Effect bits
   bool reads_uv = false;
   bool reads_offsets = false;  // has a bump: neighbours of the point are needed
+  float offset_scale = 1.0f;   // distance of those neighbours, in pixels
   bool folded = false;         // `ready` is the whole result but for normals
   bool empty = true;           // nothing comes out
   Surface ready;
@@ -115,6 +116,7 @@ struct HitContext {
   const Scene* scene = nullptr;
   const Images* images = nullptr;
   const AttributeTables* attributes = nullptr;
+  float offset_scale = 1.0f;
   bool background = false;  // a world's program: the position is the direction
   int32_t material_index = 0;
 };

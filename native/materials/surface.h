@@ -116,6 +116,7 @@ struct PathContext {
   float ray_length = 0.0f;
   bool drop_glossy = false;  // caustics off after a diffuse bounce: glossy lobes are left out
   bool drop_refractive = false;
+  float footprint = 0.0f;  // how far a pixel's neighbour lies from the point, across the path; 0: unknown
 };
 
 /// Lambert alone: the kernel of scenes whose Effects name nothing else.

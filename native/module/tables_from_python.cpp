@@ -151,10 +151,11 @@ void read_material(Material& material, const py::handle& graph, const py::dict& 
 }
 
 void read_light(Light& light, const py::dict& arguments) {
-  expect_keywords(arguments,
-                  {"kind", "transform", "name", "color", "power", "radius", "angle", "spot_size", "spot_blend", "shape",
-                   "size", "spread", "graph", "visibility", "cast_shadow", "multiple_importance", "soft_falloff"},
-                  "a light");
+  expect_keywords(
+      arguments,
+      {"kind", "transform", "name", "color", "power", "radius", "angle", "spot_size", "spot_blend", "shape", "size",
+       "spread", "graph", "visibility", "cast_shadow", "multiple_importance", "soft_falloff", "version"},
+      "a light");
   set(light.name, arguments, "name", "a light");
   const std::string owner = "light '" + light.name + "'";
   given<std::string>(arguments, "kind", owner, [&](const std::string& kind) {
@@ -176,6 +177,7 @@ void read_light(Light& light, const py::dict& arguments) {
   set(light.cast_shadow, arguments, "cast_shadow", owner);
   set(light.multiple_importance, arguments, "multiple_importance", owner);
   set(light.soft_falloff, arguments, "soft_falloff", owner);
+  set(light.version, arguments, "version", owner);
   if (!arguments.contains("graph")) return;
   light.graph.reset();
   if (!arguments["graph"].is_none()) light.graph = graph_from_python(arguments["graph"], owner);

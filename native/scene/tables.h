@@ -91,6 +91,7 @@ struct Light {
   std::optional<Graph> graph;
   uint32_t visibility = kVisibleAll;
   bool cast_shadow = true, multiple_importance = true, soft_falloff = true;
+  int32_t version = 2;  // 1: what spots and suns meant before Blender 4.0
 };
 
 struct World {

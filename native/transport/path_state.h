@@ -40,7 +40,8 @@ struct PathState {
   float density = 0.0f;  // of the last scattering's direction; 0: certain to be met by nothing else, no weighting
   Vec3 position{0.0f};   // of the last scattering, where lights were asked
   Vec3 light_normal{0.0f};
-  bool last = false;  // limits reached: only light that is run into still counts
+  float pixel_angle = 0.0f;  // between the rays of neighbouring pixels; the footprint grows by it
+  bool last = false;         // limits reached: only light that is run into still counts
 };
 
 /// Which rays an object shows itself to, by the kind of the ray that arrives.

@@ -72,6 +72,7 @@ class Walker {
       }
       if constexpr (kShapes) run_into_shapes(path, hit.t, visitor);
       path.context.ray_length = hit.t;
+      path.context.footprint += path.pixel_angle * hit.t;
       const SurfacePoint point = point_at(path, hit);
       Surface surface;
       scene_.materials.shade(scene_.scene, point, path.context, surface);

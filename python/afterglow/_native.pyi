@@ -75,7 +75,7 @@ class Cancelled(Error): ...
 # bright_contrast [color] color bright contrast   rgb_to_bw [val] color    clamp [result] value min max   params: kind
 # map_range [result vector] value from_min from_max to_min to_max steps vector…  params: data_type, interpolation, clamp
 # normal_map [normal] strength color  params: space "tangent"|"object"|"world"|"blender_object"|"blender_world", uv_map
-# bump [normal] strength distance height normal  params: invert         normal [normal dot] normal  params: direction
+# bump [normal] strength distance height normal  params: invert filter_width (pixels)         normal [normal dot] normal  params: direction
 # fresnel [fac] ior normal      layer_weight [fresnel facing] blend normal     camera [view_vector view_z_depth view_distance]
 # geometry [position normal tangent true_normal incoming parametric backfacing pointiness random_per_island]
 # light_path [is_camera_ray is_shadow_ray is_diffuse_ray is_glossy_ray is_singular_ray is_reflection_ray is_transmission_ray
@@ -147,11 +147,13 @@ class Scene:
     def add_light(self, kind: str, transform: NDArray[np.float64], *, name: str, color: tuple[float, float, float],
                   power: float, radius: float = 0.0, angle: float = 0.0, spot_size: float = 0.0, spot_blend: float = 0.0,
                   shape: str = "square", size: tuple[float, float] = (1, 1), spread: float = 3.14159265, graph: Graph | None = None,
-                  visibility: int = ..., cast_shadow: bool = True, multiple_importance: bool = True, soft_falloff: bool = True) -> int:
+                  visibility: int = ..., cast_shadow: bool = True, multiple_importance: bool = True, soft_falloff: bool = True,
+                  version: int = 2) -> int:
         """kind "point" (power in W, radius), "spot" (power in W, radius, spot_size full cone angle, spot_blend 0–1),
         "sun" (power in W/m², angle full disk angle), "area" (power in W, shape "square"|"rectangle"|"disk"|"ellipse",
         spread full angle). Units as Blender's users know them. Lights look along their local −z. graph: an emission
-        graph that multiplies color (None: 1)."""
+        graph that multiplies color (None: 1). version 1 is what Blender before 4.0 meant: a spot falls off by the cosine to
+        its axis and knows no scale, a sun's disk grows brighter to its rim by the cube of the cosine."""
     def set_light(self, light: int, **kwargs: Any) -> None: ...
     def remove_light(self, light: int) -> None: ...
 

@@ -65,6 +65,21 @@ def test_a_lamp_close_above_a_surface_lights_it(kind: str, height: float) -> Non
     assert error < 0.02 * expected
 
 
+@pytest.mark.parametrize("strategies", [True, False])
+def test_a_sphere_light_shines_as_a_point_does(strategies: bool) -> None:
+    """Where all of it stands above the horizon, however near: no ray may count its far side, too."""
+    scene = one_quad(diffuse((0.5, 0.5, 0.5)), angle=0.01)
+    built = Built(scene)
+    built.scene.add_light("point", translate((0.8, 0.3, 0.7)), name="Lamp", color=(1, 1, 1), power=4 * math.pi, radius=0.6,
+                          soft_falloff=False, multiple_importance=strategies)
+    built.scene.commit()
+    distance2 = 0.8**2 + 0.3**2 + 0.7**2
+    expected = 0.5 / math.pi * 0.7 / distance2**1.5
+    value, error = mean(built, samples=256, size=8, max_bounces=0)
+    assert abs(value - expected) < 4 * error + 1e-3 * expected
+    assert error < 0.01 * expected
+
+
 @pytest.mark.parametrize("albedo", [0.0, 0.3, 0.8])
 @pytest.mark.parametrize("bounces", [0, 1, 3])
 def test_bounce_limit_cuts_the_furnace_series(albedo: float, bounces: int) -> None:

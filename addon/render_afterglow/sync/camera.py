@@ -46,17 +46,16 @@ def without_scale(matrix: Any) -> NDArray[np.float64]:
 
 
 def pixel_border(border: Window, width: int, height: int) -> tuple[int, int, int, int]:
-    """Pixels of a border given in fractions of the image, at least one."""
-    left, right, bottom, top = border
-    x0, y0 = int(left * width), int(bottom * height)
-    x0, y0 = min(max(x0, 0), width - 1), min(max(y0, 0), height - 1)
-    return (x0, y0, min(max(int(right * width), x0 + 1), width), min(max(int(top * height), y0 + 1), height))
+    """Pixels of a border given in fractions of the image, at least one. Rounded in 32 bits, as Blender does."""
+    left, right, bottom, top = (int(np.float32(edge) * np.float32(size)) for edge, size in zip(border, (width, width, height, height)))
+    x0, y0 = min(max(left, 0), width - 1), min(max(bottom, 0), height - 1)
+    return (x0, y0, min(max(right, x0 + 1), width), min(max(top, y0 + 1), height))
 
 
 def render_size(render: Any) -> tuple[int, int]:
     """Full image in pixels, as Blender rounds it."""
-    scale = render.resolution_percentage / 100.0
-    return max(int(render.resolution_x * scale), 1), max(int(render.resolution_y * scale), 1)
+    scale = render.resolution_percentage
+    return max(render.resolution_x * scale // 100, 1), max(render.resolution_y * scale // 100, 1)
 
 
 def focus_distance(ob: Any, dof: Any) -> float:

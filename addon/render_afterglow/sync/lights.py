@@ -53,6 +53,8 @@ def read_light(light: Any, transform: NDArray[np.float64], context: Context, vis
         "cast_shadow": bool(getattr(cycles, "cast_shadow", getattr(light, "use_shadow", True))),
         "multiple_importance": bool(getattr(cycles, "use_multiple_importance_sampling", True)),
     }
+    if bpy.app.version < (4, 0, 0):  # spots and suns meant something else (measured in 3.4)
+        result["version"] = 1
     if light.type in {"POINT", "SPOT"}:
         result["radius"] = light.shadow_soft_size
         result["soft_falloff"] = bool(getattr(light, "use_soft_falloff", True))

@@ -37,8 +37,29 @@ class FilmVisitor {
     sums_[layout_[Pass::kBatches] + int(index_ % kBatchCount)] += luminance(light_);
   }
 
+  /// Depth, position and indexes are those in the middle of the pixel, as in Cycles: a walk before the first sample, of
+  /// which nothing else is kept.
+  bool wants_place() const {
+    return kPasses && (layout_[Pass::kDepth] >= 0 || layout_[Pass::kPosition] >= 0 ||
+                       layout_[Pass::kObjectIndex] >= 0 || layout_[Pass::kMaterialIndex] >= 0);
+  }
+  void begin_place(const PathState& path) {
+    begin_sample(path, 0);
+    placing_ = true;
+  }
+  void end_place() {
+    placing_ = false;
+    begin_pixel();
+    if (!surface_known_) return;
+    set(Pass::kDepth, place_.depth);
+    set(Pass::kObjectIndex, place_.object_index);
+    set(Pass::kMaterialIndex, place_.material_index);
+    add(Pass::kPosition, place_.position);
+  }
+
   bool surface(const PathState& path, const SurfacePoint& point, const Surface& surface) {
     if constexpr (kPasses) {
+      if (placing_) return path.context.depth == 0 && !place(point, surface);
       if (path.context.depth == 0) write_surface(path, point, surface);
       if (!features_known_) write_features(path, point, surface);
     }
@@ -145,6 +166,10 @@ class FilmVisitor {
     if (layout_[pass] >= 0) sums_[layout_[pass]] = value;
   }
 
+  static bool covers(const Surface& surface) {
+    return (surface.transparency.x + surface.transparency.y + surface.transparency.z) / 3.0f <= 0.5f;
+  }
+  bool place(const SurfacePoint& point, const Surface& surface);
   void write_surface(const PathState& path, const SurfacePoint& point, const Surface& surface);
   void write_features(const PathState& path, const SurfacePoint& point, const Surface& surface);
 
@@ -156,30 +181,37 @@ class FilmVisitor {
   float transparent_ = 0.0f;
   Vec3 eye_{0.0f};
   Rgb diffuse_share_{0.0f}, glossy_share_{0.0f}, transmission_share_{0.0f};  // of the first surface's lobes
-  bool surface_known_ = false, features_known_ = false;
+  bool surface_known_ = false, features_known_ = false, placing_ = false;
+  struct Place {
+    float depth = 0.0f, object_index = 0.0f, material_index = 0.0f;
+    Vec3 position{0.0f};
+  } place_;
   float sums_[FilmLayout::kMaxFloats];
 };
+
+/// True: this is the surface that the pixel's middle shows.
+template <bool kPasses>
+bool FilmVisitor<kPasses>::place(const SurfacePoint& point, const Surface& surface) {
+  if (!covers(surface)) return false;
+  const Scene& scene = in_.walk.scene.scene;
+  const Handle material = scene.material_handles()[point.material];
+  place_.depth = in_.camera.depth(point.position);
+  place_.object_index = float(scene.instances()[point.instance].object_index);
+  place_.material_index = material ? float(scene.material(material).pass_index) : 0.0f;
+  place_.position = Vec3(DVec3(point.position) + scene.origin());
+  return surface_known_ = true;
+}
 
 /// Data passes of the first surface that is more opaque than not, colours and mist of all up to there, weighted by what
 /// shows through.
 template <bool kPasses>
 void FilmVisitor<kPasses>::write_surface(const PathState& path, const SurfacePoint& point, const Surface& surface) {
-  const Scene& scene = in_.walk.scene.scene;
   const Rgb alpha = Rgb(1.0f) - surface.transparency;
-  if (!surface_known_ && (alpha.x + alpha.y + alpha.z) / 3.0f >= 0.5f) {
+  if (!surface_known_ && covers(surface)) {
     surface_known_ = true;
-    if (index_ == 0) {
-      const InstanceRecord& instance = scene.instances()[point.instance];
-      set(Pass::kDepth, in_.camera.depth(point.position));
-      set(Pass::kObjectIndex, float(instance.object_index));
-      if (layout_[Pass::kMaterialIndex] >= 0) {
-        const Handle material = scene.material_handles()[point.material];
-        set(Pass::kMaterialIndex, material ? float(scene.material(material).pass_index) : 0.0f);
-      }
-      add(Pass::kPosition, Vec3(DVec3(point.position) + scene.origin()));
-    }
     add(Pass::kNormal, mean_normal(point, surface));
-    add(Pass::kUv, Vec3(point.uv, 1.0f));
+    const Mesh& mesh = *in_.walk.scene.scene.instances()[point.instance].mesh;
+    if (mesh.active_uv < mesh.uvs.size()) add(Pass::kUv, Vec3(point.uv, 1.0f));
   }
   if (layout_[Pass::kDiffuseColor] >= 0 || layout_[Pass::kGlossyColor] >= 0 || layout_[Pass::kTransmissionColor] >= 0) {
     const SurfaceAlbedo color = albedo(surface, point.outgoing);

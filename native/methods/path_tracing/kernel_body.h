@@ -7,6 +7,8 @@
 
 namespace afterglow::path_tracing {
 
+inline float mean_length(const Vec3& a, const Vec3& b) { return 0.5f * (glm::length(a) + glm::length(b)); }
+
 template <uint32_t kFeatures>
 void render_request(const KernelInput& in, const PixelRequest& request, RayCounts& counts) {
   constexpr bool kPasses = kFeatures & kFeaturePasses;
@@ -21,17 +23,23 @@ void render_request(const KernelInput& in, const PixelRequest& request, RayCount
         continue;
       visitor.begin_pixel();
       const uint32_t pixel_seed = hash(x, y, in.seed);
-      for (uint32_t i = request.first; i < request.first + request.count; ++i) {
+      bool placing = kPasses && request.first == 0 && visitor.wants_place();  // one walk more, before the first sample
+      for (uint32_t i = request.first; i < request.first + request.count;) {
         Sampler sampler(hash(pixel_seed, i % kBatchCount), i / kBatchCount);
         const Vec2 in_pixel = in.film.filter().offset(sampler.next2());
         const Vec2 on_lens = lens ? sampler.next2() : Vec2(0.5f);
-        const CameraRay camera_ray = in.camera.ray(Vec2(float(x) + 0.5f, float(y) + 0.5f) + in_pixel, on_lens);
+        const Vec2 middle(float(x) + 0.5f, float(y) + 0.5f);
+        const CameraRay camera_ray = in.camera.ray(placing ? middle : middle + in_pixel, on_lens);
         PathState path;
         path.ray = camera_ray.ray;
         path.ray.mask = kVisibleCamera;
-        visitor.begin_sample(path, i);
+        path.context.footprint = mean_length(camera_ray.origin_dx, camera_ray.origin_dy);
+        path.pixel_angle = mean_length(camera_ray.direction_dx, camera_ray.direction_dy);
+        placing ? visitor.begin_place(path) : visitor.begin_sample(path, i);
         walker.walk(path, sampler, visitor);
-        visitor.end_sample();
+        placing ? visitor.end_place() : visitor.end_sample();
+        i += placing ? 0 : 1;
+        placing = false;
       }
       in.film.add(x, y, visitor.sums(), request.count);
     }

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from . import closures, textures
-from .compiler import Compiler, NodeView, Source, snake
+from .compiler import Compiler, NodeView, Source, is_link, snake
 
 Outputs = dict[str, Source]
 Rule = Callable[[Compiler, NodeView], Any]
@@ -101,7 +101,9 @@ def bump_node(compiler: Compiler, view: NodeView) -> Outputs:
         return {"Normal": view.input("Normal")}
     given = {"strength": view.input("Strength"), "distance": view.input("Distance"), "height": view.input("Height"),
              "normal": view.input("Normal")}
+    width = view.input("Filter Width") if view.has("Filter Width") else 1.0  # before 4.3: always a pixel
     return {"Normal": compiler.link("normal", "bump", view.node.name, given, invert=view.node.invert,
+                                    filter_width=1.0 if is_link(width) or width is None else float(width),
                                     version=closures.generation("bump"))}
 
 
