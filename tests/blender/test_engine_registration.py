@@ -19,7 +19,7 @@ def test_registers_and_leaves_nothing(in_blender: Run) -> None:
                       if 'AFTERGLOW' in getattr(p, 'COMPAT_ENGINES', ())]
             handlers = [f.__module__ for f in [*bpy.app.handlers.load_pre, *bpy.app.handlers.load_post]]
             return dict(panels=panels, scene=hasattr(bpy.types.Scene, 'afterglow'),
-                        engines=[e.bl_idname for e in bpy.types.RenderEngine.__subclasses__()],
+                        engines=[getattr(e, 'bl_idname', '') for e in bpy.types.RenderEngine.__subclasses__()],
                         handlers=[m for m in handlers if 'afterglow' in m])
         with_it = traces()
         addon_utils.disable(name)
