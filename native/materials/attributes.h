@@ -31,6 +31,8 @@ struct AttributeTables {
   }
 };
 
+/// Before the name of a UV map: the corners' tangents in object space and, fourth, the sign of the bitangent.
+inline const std::string kTangents = "tangents of ";
 inline constexpr const char* kActiveColor = "\001active color";
 
 /// Interpolated at the hit; missing components are 0, a missing alpha 1.

@@ -24,11 +24,22 @@ Vec3 cosine_sample(const Vec2& u) {
   return {r * around.y, r * around.x, std::sqrt(std::fmax(0.0f, 1.0f - u.x))};
 }
 
-/// Normals that do not bend with the surface let light in at angles where the surface itself is turned away: the smooth
-/// shadowing of Chiang et al. 2019 ("Taming the Shadow Terminator").
-float bump_shadowing(const Vec3& face, const Vec3& normal, const Vec3& direction) {
-  const float bottom = glm::dot(normal, direction) * glm::dot(face, normal);
-  const float g = bottom != 0.0f ? glm::dot(face, direction) / bottom : 0.0f;
+/// Normals that do not bend with the surface let light in at angles where the surface itself (`smooth`: its shading
+/// normal) is turned away. The bumps are taken for a rough surface and mask each other (Conty Estevez et al. 2019, "A
+/// Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem").
+float bump_masking(const Vec3& smooth, const Vec3& normal, const Vec3& direction) {
+  const float cos_i = glm::dot(smooth, direction), cos_d = glm::dot(smooth, normal);
+  if (cos_i * cos_d < 0.0f) return 0.0f;
+  if (std::fabs(cos_d) >= 1.0f || std::fabs(cos_i) >= 1.0f) return 1.0f;
+  if (std::fabs(cos_i) < 1e-6f) return 0.0f;
+  const float alpha2 = saturate(0.125f * (1.0f / sqr(std::fmax(std::fabs(cos_d), 1e-6f)) - 1.0f));
+  return 2.0f / (1.0f + std::sqrt(1.0f + alpha2 * (1.0f / sqr(cos_i) - 1.0f)));
+}
+
+/// The same before Blender 4.3: the smooth shadowing of Chiang et al. 2019 ("Taming the Shadow Terminator").
+float bump_shadowing(const Vec3& smooth, const Vec3& normal, const Vec3& direction) {
+  const float bottom = glm::dot(normal, direction) * glm::dot(smooth, normal);
+  const float g = bottom != 0.0f ? glm::dot(smooth, direction) / bottom : 0.0f;
   if (g >= 1.0f) return 1.0f;
   return g <= 0.0f ? 0.0f : g * (1.0f + g - g * g);
 }
@@ -160,7 +171,10 @@ LobeValue lobe_value(const Lobe& lobe, const Vec3& face, const Vec3& o, const Ve
         const float length = glm::length(h);
         result.value = Rgb(length > 1e-6f ? cos_i * fifth(saturate(1.0f - glm::dot(i, h) / length)) : 0.0f);
       }
-      if (lobe.bumped) result.value *= bump_shadowing(face, lobe.normal, i);
+      if (lobe.bumped)
+        result.value *= lobe.kind == LobeKind::kSheenV1           ? bump_shadowing(face, lobe.normal, i)
+                        : lobe.distribution == Distribution::kGgx ? bump_masking(lobe.tangent, lobe.normal, i)
+                                                                  : bump_shadowing(lobe.tangent, lobe.normal, i);
       return result;
     }
     case LobeKind::kTranslucent: {

@@ -360,6 +360,7 @@ Program Emitter::lower() {
   }
   program.reads_offsets = reads_offsets;
   program.offset_scale = offset_scale;
+  program.washed = washed;
   program.effects |= closure_effects;
   if (too_large) {
     warn("the node tree is too large: it is shown grey");

@@ -75,6 +75,7 @@ class Emitter {
   uint32_t current = 0, current_offset = 0;
   bool reads_offsets = false;
   float offset_scale = 1.0f;
+  bool washed = false;
   uint32_t closure_effects = 0;
 
  private:

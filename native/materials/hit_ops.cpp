@@ -186,8 +186,8 @@ Vec3 object_info(uint32_t which, const HitContext& hit) {
   }
 }
 
-/// Tangent of a UV map at the hit's triangle, at right angles to the normal; sign: handedness. (MikkTSpace averages
-/// these over corners; here each triangle has its own.)
+/// Tangent of a UV map at the hit's triangle, at right angles to the normal; sign: handedness. For meshes
+/// that bring no tangents of their own.)
 bool uv_tangent(const HitContext& hit, uint32_t number, const Vec3& normal, Vec3& tangent, float& sign) {
   const SurfacePoint& p = *hit.points[0];
   const InstanceRecord* record = instance_of(hit, p);
@@ -225,6 +225,16 @@ Vec3 normal_map(const Instruction& ins, const Operands& in, const HitContext& hi
     Vec3 tangent;
     float sign;
     const Vec3 n = p.normal * turn;
+    const AttributeSlot* corners = hit.attributes ? hit.attributes->find(p.instance, in.u(3)) : nullptr;
+    if (corners) {  // in object space, where they were made
+      const InstanceRecord& record = *instance_of(hit, p);
+      const Vec4 t = interpolate(*corners, *record.mesh, p);
+      const Vec3 own = unit_or(record.to_world.transposed(n), n), along(t);
+      c.x *= strength, c.y *= strength;
+      c.z = 1.0f + (c.z - 1.0f) * saturate(strength);
+      const Vec3 mapped = along * c.x + glm::cross(own, along) * (t.w * c.y) + own * c.z;
+      return unit_or(record.to_object.transposed(unit_or(mapped, own)), n) * turn;
+    }
     if (!uv_tangent(hit, in.u(1), n, tangent, sign)) return p.normal;
     c.x *= strength, c.y *= strength;
     c.z = 1.0f + (c.z - 1.0f) * saturate(strength);

@@ -329,6 +329,12 @@ void run(const Program& program, HitContext& hit, Surface& out) {
   } else {
     execute(program, hit, room.registers, &out);
   }
+  for (int k = 0; k < out.count; ++k) {
+    Lobe& lobe = out.lobes[k];
+    if (!lobe.bumped || lobe.kind > LobeKind::kBurley) continue;
+    lobe.tangent = hit.points[0]->normal;  // what its normal was bent from: diffuse lobes have no tangent
+    if (program.washed) lobe.distribution = Distribution::kGgxSeparable;
+  }
   float sum = 0.0f;
   for (int k = 0; k < out.count; ++k) sum += out.lobes[k].sampling_weight;
   if (out.count == 1 && sum > 0.0f) {

@@ -143,10 +143,12 @@ void normal_map(Emitter& e) {
                           : space == "blender_object" ? 3
                           : space == "blender_world"  ? 4
                                                       : 0;
+  e.washed |= e.text("shadowing", "") == "chiang";
+  const uint32_t tangents = number == 0 ? e.attribute(kTangents + map) : kNone;
   e.output("normal", Type::kVector,
            e.emit(Op::kNormalMap,
                   {e.input("strength", Type::kFloat, 1.0f), e.input("color", Type::kColor, Vec3(0.5f, 0.5f, 1.0f))},
-                  {number, map.empty() ? kNone : e.attribute(map), e.version()}));
+                  {number, map.empty() ? kNone : e.attribute(map), e.version(), tangents}));
 }
 
 void bump(Emitter& e) {
@@ -155,6 +157,7 @@ void bump(Emitter& e) {
     return e.output("normal", Type::kVector, normal.none() ? e.emit(Op::kGeometry, {}, {1, 0}) : normal);
   }
   // One pair of neighbours serves a whole program: the last bump's width.
+  e.washed |= e.text("shadowing", "") == "chiang";
   e.offset_scale = float(std::clamp(e.number("filter_width", 1.0), 1e-3, 1e3));
   e.output("normal", Type::kVector,
            e.emit(Op::kBump,

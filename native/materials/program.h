@@ -103,6 +103,7 @@ struct Program {
   uint32_t effects = 0;  // Effect bits
   bool reads_uv = false;
   bool reads_offsets = false;  // has a bump: neighbours of the point are needed
+  bool washed = false;         // bumps shadowed as before Blender 4.3
   float offset_scale = 1.0f;   // distance of those neighbours, in pixels
   bool folded = false;         // `ready` is the whole result but for normals
   bool empty = true;           // nothing comes out

@@ -74,8 +74,9 @@ class Cancelled(Error): ...
 # hue_saturation [color] hue saturation value fac color     gamma [color] color gamma      invert [color] fac color
 # bright_contrast [color] color bright contrast   rgb_to_bw [val] color    clamp [result] value min max   params: kind
 # map_range [result vector] value from_min from_max to_min to_max steps vector…  params: data_type, interpolation, clamp
-# normal_map [normal] strength color  params: space "tangent"|"object"|"world"|"blender_object"|"blender_world", uv_map
-# bump [normal] strength distance height normal  params: invert filter_width (pixels)         normal [normal dot] normal  params: direction
+# normal_map [normal] strength color  params: space "tangent"|"object"|"world"|"blender_object"|"blender_world", uv_map, shadowing
+#             "conty"|"chiang" (before Blender 4.3); a corner attribute "tangents of UV_MAP" (xyz, sign of the bitangent) is taken where it is
+# bump [normal] strength distance height normal  params: invert filter_width (pixels) shadowing         normal [normal dot] normal  params: direction
 # fresnel [fac] ior normal      layer_weight [fresnel facing] blend normal     camera [view_vector view_z_depth view_distance]
 # geometry [position normal tangent true_normal incoming parametric backfacing pointiness random_per_island]
 # light_path [is_camera_ray is_shadow_ray is_diffuse_ray is_glossy_ray is_singular_ray is_reflection_ray is_transmission_ray

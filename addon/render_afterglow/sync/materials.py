@@ -11,6 +11,7 @@ import bpy
 
 from .images import read_image, signature
 from .lights import uses_nodes
+from .attributes import NOBODY, Owner, property_of
 from .nodes import Context, Graph, compile_tree, names_of_attributes, solid_graph
 
 DEFAULT = 0  # the key of Blender's default surface: an empty slot
@@ -72,6 +73,12 @@ class MaterialTable:
     _frame: int = 0
     _report: Any = None
     _reads_matrix: bool = False
+    # Materials that ask for properties of the object that shows them: one of the native scene for each of those.
+    personal: set[int] = field(default_factory=set)
+    _variants: dict[tuple[int, int, int], int] = field(default_factory=dict)
+    _reads_owner: bool = False
+    _owner: Owner = NOBODY
+    _view: tuple[Any, ...] = ()
 
     # -- one sync
 
@@ -80,6 +87,7 @@ class MaterialTable:
         self._report, self._dirty_images = report, updates.images
         self._everything = updates.everything or updates.trees or bool(updates.images) or depsgraph.scene.frame_current != self._frame
         self._frame = depsgraph.scene.frame_current
+        self._view = (depsgraph.view_layer_eval, depsgraph.scene_eval, depsgraph.scene_eval.world)
         self._fresh, self.attributes_changed = set(), False
         self._dirty = set(updates.materials)
         if not self._everything and not self._dirty and not self.moving:
@@ -105,21 +113,30 @@ class MaterialTable:
 
     # -- materials
 
-    def handle(self, material: Any, user: str, hollow: bool = False) -> tuple[int, int]:
+    def handle(self, material: Any, user: str, hollow: bool = False, owner: Owner = NOBODY) -> tuple[int, int]:
         """(key, handle) of an evaluated material, None for an empty slot. user: an object for warnings."""
         original = DEFAULT if material is None else material.original.as_pointer()
         address = original + (HOLLOW if hollow else 0)
         known = self.table.get(address)
-        if known is None or (address not in self._fresh and (self._everything or original in self._dirty)):
+        if address not in self.personal and (
+                known is None or (address not in self._fresh and (self._everything or original in self._dirty))):
             known = self._compile(address, material, user)
+        if address in self.personal:
+            address = self._variants.setdefault((address, *owner.key), -1 - len(self._variants))
+            known = self.table.get(address) if address in self._fresh else None
+            if known is None:
+                known = self._compile(address, material, user, owner, hollow)
         return address, known.handle
 
-    def _compile(self, address: int, material: Any, user: str) -> Material:
+    def _compile(self, address: int, material: Any, user: str, owner: Owner = NOBODY, hollow: bool = False) -> Material:
         self._fresh.add(address)
-        self._reads_matrix = False
+        self._reads_matrix = self._reads_owner = False
+        self._owner = owner
         graph, arguments = self._read(material, user)
-        if address & HOLLOW:
+        if hollow if address < 0 else address & HOLLOW:
             graph = hollow_graph(graph)
+        if address >= 0:
+            (self.personal.add if self._reads_owner else self.personal.discard)(address)
         (self.moving.add if self._reads_matrix else self.moving.discard)(address)
         key, known = digest((graph, arguments)), self.table.get(address)
         if known is not None and known.key == key:
@@ -153,7 +170,16 @@ class MaterialTable:
         return graph, {"name": material.name, "pass_index": material.pass_index, "emission_sampling": bool(sampling)}
 
     def context(self, owner: str) -> Context:
-        return Context(image=lambda image, user: self.image(image, user, owner), warn=self.warn, matrix=self._matrix, owner=owner)
+        return Context(image=lambda image, user: self.image(image, user, owner), warn=self.warn, matrix=self._matrix, owner=owner,
+                       attribute=self._attribute)
+
+    def _attribute(self, kind: str, name: str) -> tuple[float, ...] | None:
+        """A property of the object that shows the material, of what made it an instance, or of the view layer."""
+        if kind == "VIEW_LAYER":
+            self._reads_matrix = True  # nobody tells when it changes: read again with each sync
+            return property_of(self._view, name)
+        self._reads_owner = True
+        return property_of(self._owner.places(kind == "INSTANCER"), name)
 
     def _matrix(self, ob: Any) -> list[list[float]]:
         self._reads_matrix = True

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import SRGB_TO_LINEAR, raw_view, read
-from .nodes import GENERATED
+from .nodes import GENERATED, TANGENTS
+from .tangents import tangents
 
 DOMAINS = {"POINT": "vertex", "CORNER": "corner", "FACE": "face"}
 # data type of an attribute → (property, memory type, width, type of foreach_get)
@@ -39,6 +40,11 @@ def read_mesh(mesh: Any, attributes: Iterable[str] = ()) -> dict[str, Any] | Non
     result.update(_read_normals(mesh))
     result["uvs"], result["active_uv"] = _read_uvs(mesh)
     result["attributes"], result["active_color"] = _read_attributes(mesh, set(attributes))
+    for name in attributes:
+        if name.startswith(TANGENTS):
+            found = tangents(result, name[len(TANGENTS):])
+            if found is not None:
+                result["attributes"][name] = ("corner", found)
     return result
 
 

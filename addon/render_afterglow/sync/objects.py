@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .attributes import Owner, random_of_name
 from .lights import is_portal, read_light
 from .materials import MaterialTable, digest
 from .meshes import fingerprint, read_mesh
-from .nodes import GENERATED
+from .nodes import GENERATED, TANGENTS
 from .points import point_transforms, unit_sphere
 from .visibility import object_visibility
 
@@ -142,7 +143,7 @@ class ObjectTable:
                     walks[key] = walk
             if walk.group is not None:
                 walk.matrices.append(instance.matrix_world.copy())
-                walk.randoms.append(instance.random_id)
+                walk.randoms.append(instance.random_id if instance.is_instance else random_of_name(ob.name))
         self._finish([walk for walk in walks.values() if walk.group is not None])
 
     def _begin(self, instance: Any, ob: Any, data: Any, addresses: tuple[int, int, int], lights: bool) -> Walk:
@@ -194,8 +195,8 @@ class ObjectTable:
             group.address = data.as_pointer()
         else:
             self._warn_of(ob)
-            pairs = [self.materials.handle(material, ob.name, use.is_points) for material in self._slots(ob, data)]
             parent = instance.parent if instance.is_instance else None
+            pairs = [self.materials.handle(material, ob.name, use.is_points, Owner(ob, parent)) for material in self._slots(ob, data)]
             bits, holdout, catcher = object_visibility(ob, parent, self.layer)
             properties = {"name": ob.name, "materials": tuple(handle for _, handle in pairs), "object_index": ob.pass_index,
                           "visibility": bits, "holdout": holdout, "shadow_catcher": catcher, "color": tuple(ob.color)}
@@ -269,7 +270,7 @@ class ObjectTable:
     @staticmethod
     def _names(use: MeshUse) -> frozenset[str]:
         attributes = getattr(use.data, "attributes", ())
-        return frozenset(name for name in use.wanted if name in ("", GENERATED) or name in attributes)
+        return frozenset(name for name in use.wanted if name in ("", GENERATED) or name.startswith(TANGENTS) or name in attributes)
 
     def _read_mesh(self, use: MeshUse, address: int, names: frozenset[str], known: MeshEntry | None) -> MeshEntry:
         entry = MeshEntry(known.handle if known else None, use.key, address, fingerprint_of(use), names)

@@ -43,6 +43,11 @@ def generation(kind: str) -> int:
     return 1 if bpy.app.version < ((4, 3, 0) if kind == "diffuse_bsdf" else (4, 0, 0)) else 2
 
 
+def bump_shadowing() -> str:
+    """How light at grazing angles fades on bent normals (measured: 4.2 the old way, 4.5 the new)."""
+    return "chiang" if bpy.app.version < (4, 3, 0) else "conty"
+
+
 def principled_node(compiler: Compiler, view: NodeView) -> Outputs:
     first = view.has("Specular") and not view.has("Specular IOR Level")
     names = PRINCIPLED_1 if first else PRINCIPLED_2

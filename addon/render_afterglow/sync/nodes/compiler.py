@@ -28,6 +28,8 @@ class Context:
     warn: Callable[[str], None]
     matrix: Callable[[Any], Any]
     owner: str = ""
+    # attribute("OBJECT" | "INSTANCER" | "VIEW_LAYER", name) → four floats, or None where there is no such property
+    attribute: Callable[[str, str], tuple[float, ...] | None] = lambda kind, name: None
     version: tuple[int, ...] = (5, 0, 0)
     said: set[str] = field(default_factory=set)
 
@@ -287,6 +289,7 @@ def constant_emission(graph: Graph) -> tuple[float, float, float] | None:
 
 
 GENERATED = "generated"  # the name under which a mesh carries coordinates of its undeformed shape
+TANGENTS = "tangents of "  # before a UV map's name ("": the active one): under which a mesh carries tangents for normal maps
 
 
 def names_of_attributes(graph: Graph) -> set[str]:
@@ -296,6 +299,8 @@ def names_of_attributes(graph: Graph) -> set[str]:
         kind, params = node["type"], node["params"]
         if kind == "color_attribute" or (kind == "attribute" and params["kind"] == "geometry" and params["name"]):
             names.add(params["name"])
+        if kind == "normal_map" and params.get("space", "tangent") == "tangent":
+            names.add(TANGENTS + params.get("uv_map", ""))
         if any(is_link(value) and value[2] == GENERATED for value in node["inputs"].values()) or reads_generated(node):
             names.add(GENERATED)
     return names

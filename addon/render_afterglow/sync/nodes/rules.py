@@ -103,7 +103,7 @@ def bump_node(compiler: Compiler, view: NodeView) -> Outputs:
              "normal": view.input("Normal")}
     width = view.input("Filter Width") if view.has("Filter Width") else 1.0  # before 4.3: always a pixel
     return {"Normal": compiler.link("normal", "bump", view.node.name, given, invert=view.node.invert,
-                                    filter_width=1.0 if is_link(width) or width is None else float(width),
+                                    shadowing=closures.bump_shadowing(), filter_width=1.0 if is_link(width) or width is None else float(width),
                                     version=closures.generation("bump"))}
 
 
@@ -115,7 +115,8 @@ def displacement_node(compiler: Compiler, view: NodeView) -> Outputs:
 def attribute_node(compiler: Compiler, view: NodeView) -> Outputs:
     node = view.node
     if node.attribute_type in {"OBJECT", "INSTANCER", "VIEW_LAYER"}:
-        compiler.context.warn_once(f"attribute '{node.attribute_name}' of {node.attribute_type.lower()} is taken as 0")
+        value = compiler.context.attribute(node.attribute_type, node.attribute_name) or (0.0, 0.0, 0.0, 0.0)
+        return {"Color": value[:3], "Vector": value[:3], "Fac": sum(value[:3]) / 3.0, "Alpha": value[3]}
     index = compiler.add("attribute", node.name, name=node.attribute_name, kind=node.attribute_type.lower())
     return {name: ("link", index, name.lower()) for name in ("Color", "Vector", "Fac", "Alpha")}
 
@@ -189,7 +190,8 @@ RULES: dict[str, Rule] = {
     "ShaderNodeMapping": plain("mapping", lambda n: {"kind": n.vector_type.lower()}),
     "ShaderNodeNormalMap": renamed("normal_map", {"Strength": "strength", "Color": "color"}, {"Normal": "normal"},
                                    lambda n: {"space": n.space.lower(), "uv_map": n.uv_map,
-                                              "version": closures.generation("normal_map")}),
+                                              "version": closures.generation("normal_map"),
+                                              "shadowing": closures.bump_shadowing()}),
     "ShaderNodeBump": bump_node,
     "ShaderNodeNormal": normal_node,
     "ShaderNodeDisplacement": displacement_node,
