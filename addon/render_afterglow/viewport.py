@@ -24,7 +24,8 @@ from .sync.scene import viewport_shading
 
 _NOTHING = object()
 WATCH_SECONDS = 0.015  # how often the watcher looks for a newer picture
-AWAIT_SECONDS = 0.06  # how long a redraw waits for the first picture after an edit, at most
+AWAIT_SECONDS = 0.1  # how long a redraw waits for the first picture after an edit, at most
+HOLD_SECONDS = 0.15  # how long the render leaves the processor to the drawing of that picture, at most
 REDRAW_SECONDS = 0.05  # between two redraws of a picture that refines slowly, at least
 
 
@@ -39,6 +40,9 @@ class Watcher(threading.Thread):
         self._wake = threading.Event()
         self._session: Any = None
         self._seen = -1
+        self._shown = threading.Event()
+        self._held = False
+        self._holding = threading.Lock()
 
     def watch(self, session: Any) -> None:
         """Looks at this session from now on."""
@@ -51,6 +55,28 @@ class Watcher(threading.Thread):
     def stop(self) -> None:
         self._stop.set()
         self._wake.set()
+        self._shown.set()
+
+    def hold(self) -> None:
+        """Pauses the render until Blender has shown what it draws now: with processors for both, pictures of graphics
+        drivers in software come several times later."""
+        with self._holding:
+            self._session.pause()
+            self._shown.clear()
+            self._held = True
+        self._wake.set()
+        bpy.app.timers.register(self.shown)  # runs when the window was drawn
+
+    def shown(self) -> None:
+        self._shown.set()
+
+    def release(self) -> None:
+        """Ends a hold at once."""
+        with self._holding:
+            if self._held:
+                self._held = False
+                self._session.resume()
+                self._shown.set()
 
     def run(self) -> None:
         last = 0.0
@@ -58,6 +84,9 @@ class Watcher(threading.Thread):
             self._wake.wait()
             self._wake.clear()
             while not self._stop.is_set():
+                if self._held:
+                    self._shown.wait(HOLD_SECONDS)
+                    self.release()
                 session = self._session
                 if session is None:
                     break
@@ -94,6 +123,7 @@ class Viewport:
         self.picture: display.Picture | None = None
         self.generation = -1
         self.awaited = -1  # the picture of before the last edit; -1: a newer one is there
+        self.waited = False  # whether a redraw has waited for that newer one already
         self.view: CameraView | None = None
         self.settings: dict[str, Any] = {}
         self.shading: Any = None  # scene's or studio's lights and world, as they were synced
@@ -136,7 +166,7 @@ class Viewport:
             self._sync(context, depsgraph)
             self._start(context, depsgraph)
         else:
-            self.awaited = self.session.progress()["generation"]
+            self._expect()
             with self.session.edit():
                 self._sync(context, depsgraph)
                 self._set_view(context, depsgraph)
@@ -144,6 +174,11 @@ class Viewport:
             self.watcher.wake()
         for text in self.native.take_warnings():
             print("Afterglow:", text)
+
+    def _expect(self) -> None:
+        """From now on a newer picture is awaited."""
+        self.watcher.release()
+        self.awaited, self.waited = self.session.progress()["generation"], False
 
     def _sync(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         self.native.sync.sync(depsgraph, view=context.space_data)
@@ -180,7 +215,7 @@ class Viewport:
         changed = {name: value for name, value in settings.items() if value != self.settings.get(name, _NOTHING)}
         self.view, self.settings = view, settings
         if moved or relit or changed:
-            self.awaited = self.session.progress()["generation"]
+            self._expect()
             with self.session.edit():
                 if relit:
                     self._sync(context, depsgraph)
@@ -203,6 +238,7 @@ class Viewport:
     def _pause(self, wanted: bool) -> None:
         if wanted != self.paused:
             self.paused = wanted
+            self.watcher.release()
             if wanted:
                 self.session.pause()
             else:
@@ -225,12 +261,12 @@ class Viewport:
     def _await(self) -> dict[str, Any]:
         """The session's progress, after an edit as soon as its first picture is there, or without it a moment later:
         what is drawn then mostly is new, and no time goes into drawing an old picture once more."""
-        end = time.perf_counter() + AWAIT_SECONDS
+        end = time.perf_counter() + (0.0 if self.waited else AWAIT_SECONDS)
         progress = self.session.progress()
         while progress["generation"] == self.awaited and progress["state"] == "running" and time.perf_counter() < end:
             time.sleep(0.001)
             progress = self.session.progress()
-        self.awaited = -1
+        self.waited = True
         return progress
 
     def _draw(self, engine: Any, context: bpy.types.Context) -> None:
@@ -245,6 +281,9 @@ class Viewport:
             self.session.read("combined", self.picture.pixels)
             self.picture.upload()
             self.generation = progress["generation"]
+            if self.awaited >= 0 and progress["state"] == "running":
+                self.watcher.hold()
+            self.awaited = -1
         scale_x = context.region.width / self.view.width
         scale_y = context.region.height / self.view.height
         if self.picture is not None:

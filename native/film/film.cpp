@@ -71,8 +71,7 @@ Film::Film(const FilmSettings& settings)
 
 size_t Film::bytes() const { return sums_.size() * sizeof(float) + counts_.size() * sizeof(uint32_t) + locks_.size(); }
 
-void Film::clear() {
-  std::fill(sums_.begin(), sums_.end(), 0.0f);
+void Film::clear() {  // sums without samples are never read: they need no zeros
   std::fill(counts_.begin(), counts_.end(), 0u);
 }
 
@@ -80,7 +79,10 @@ void Film::add(uint32_t x, uint32_t y, const float* sums, uint32_t samples) {
   const size_t pixel = size_t(y - settings_.y0) * width() + (x - settings_.x0);
   float* to = sums_.data() + pixel * size_t(layout_.floats);
   const Lock lock(*this, pixel);
-  for (int i = 0; i < layout_.floats; ++i) to[i] += sums[i];
+  if (counts_[pixel])
+    for (int i = 0; i < layout_.floats; ++i) to[i] += sums[i];
+  else
+    std::copy_n(sums, layout_.floats, to);
   counts_[pixel] += samples;
 }
 
@@ -161,15 +163,16 @@ void Film::read(Pass pass, float* out, uint32_t step) const {
   const size_t channels = pass_info(pass).channels;
   const uint32_t w = width(), h = height();
   std::array<float, FilmLayout::kMaxFloats> sums;
-  for (uint32_t y = 0; y < h; ++y)
+  for (uint32_t y = 0; y < h; ++y) {
+    if (y % step) {
+      float* row = out + size_t(y) * w * channels;
+      std::memcpy(row, row - size_t(w) * channels, size_t(w) * channels * sizeof(float));
+      continue;
+    }
     for (uint32_t x = 0; x < w; ++x) {
       float* to = out + (size_t(y) * w + x) * channels;
       if (x % step) {
         std::memcpy(to, to - channels, channels * sizeof(float));
-        continue;
-      }
-      if (y % step) {
-        std::memcpy(to, to - size_t(w) * channels, channels * sizeof(float));
         continue;
       }
       const size_t pixel = size_t(y) * w + x;
@@ -179,8 +182,10 @@ void Film::read(Pass pass, float* out, uint32_t step) const {
         std::memcpy(sums.data(), sums_.data() + pixel * size_t(layout_.floats), size_t(layout_.floats) * sizeof(float));
         samples = counts_[pixel];
       }
+      if (!samples) sums.fill(0.0f);
       read_pixel(pass, sums.data(), samples, to);
     }
+  }
 }
 
 BelievedError Film::believed_error() const {

@@ -22,10 +22,17 @@ uint32_t next_count(uint32_t done, bool timed) {
 }  // namespace
 
 PassPlan plan_pass(const ScheduleOptions& options, uint32_t index, uint32_t done) {
-  if (options.viewport && index <= kCoarsePasses)
-    return {0, options.samples ? 1u : 0u, 8u >> index, index ? 16u >> index : 0u};
+  if (options.viewport && index < 32 && options.coarsest >> index)
+    return {0, options.samples ? 1u : 0u, options.coarsest >> index, index ? 2 * options.coarsest >> index : 0u};
   const uint32_t wanted = options.viewport ? (done < 16 ? 1u : 2u) : next_count(done, options.timed);
   return {done, std::min(wanted, options.samples - std::min(done, options.samples)), 1, 0};
+}
+
+uint32_t coarsest_step(uint64_t pixels, double sample_seconds) {
+  if (!(sample_seconds > 0.0)) return 8;
+  uint32_t step = 1;
+  while (step<kCoarsestStep&& double(pixels) * sample_seconds> kFirstPassSeconds * step * step) step *= 2;
+  return step;
 }
 
 std::vector<PixelRequest> pass_requests(const PassPlan& plan, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1) {

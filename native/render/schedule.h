@@ -19,12 +19,18 @@ struct PassPlan {
 struct ScheduleOptions {
   uint32_t samples = 128;
   bool viewport = false;
-  bool timed = false;  // small passes, so that a time limit is met closely
+  bool timed = false;     // small passes, so that a time limit is met closely
+  uint32_t coarsest = 8;  // pixels: grid of a viewport's first pass, a power of two
 };
 
 /// Pass number `index` of a render, when `done` samples stand in every pixel.
 PassPlan plan_pass(const ScheduleOptions&, uint32_t index, uint32_t done);
-inline constexpr uint32_t kCoarsePasses = 3;  // of a viewport, before every pixel has its first sample
+
+/// Grid of a viewport's first pass: the finest that is rendered within kFirstPassSeconds where a sample takes
+/// `sample_seconds` (0: not known). The grid decides when a pixel gets its first sample and never what that sample is.
+uint32_t coarsest_step(uint64_t pixels, double sample_seconds);
+inline constexpr double kFirstPassSeconds = 0.02;
+inline constexpr uint32_t kCoarsestStep = 32;
 
 /// The pass as requests over a region, in an order that keeps neighbours together.
 std::vector<PixelRequest> pass_requests(const PassPlan&, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1);

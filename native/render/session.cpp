@@ -193,16 +193,21 @@ PassSet Session::passes() const {
   return (film_ ? film_->settings().passes : shown_settings_.film.passes) | kAlwaysKept;
 }
 
+std::shared_ptr<const Session::Image> Session::shown() const {
+  const std::lock_guard lock(mutex_);
+  return shown_;
+}
+
 void Session::read(Pass pass, std::vector<float>& out, uint32_t& width, uint32_t& height) const {
   std::shared_ptr<Film> film;
   uint32_t step;
+  if (const auto shown = pass == Pass::kCombined ? this->shown() : nullptr) {
+    out = shown->rgba;
+    width = shown->width, height = shown->height;
+    return;
+  }
   {
     const std::lock_guard lock(mutex_);
-    if (pass == Pass::kCombined && shown_) {
-      out = shown_->rgba;
-      width = shown_->width, height = shown_->height;
-      return;
-    }
     // A viewport shows whole images only: until the first, nothing.
     if (!(pass == Pass::kCombined && shown_settings_.viewport)) film = film_;
     step = film_step_;
@@ -253,7 +258,7 @@ void Session::run(RenderSettings settings) {
     {
       const std::lock_guard lock(mutex_);
       film_ = film;
-      film_step_ = settings.viewport ? 8 : 1;
+      film_step_ = settings.viewport ? kCoarsestStep : 1;
       if (!settings.viewport) shown_ = nullptr;
       statistics_.method = renderer.method();
       statistics_.effects = scene_->effects.bits;

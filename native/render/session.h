@@ -69,12 +69,14 @@ class Session {
   /// One pass, width × height × channels floats; throws InvalidInput when it is not kept. Never waits for the render.
   void read(Pass, std::vector<float>& out, uint32_t& width, uint32_t& height) const;
 
- private:
   struct Image {  // a finished picture that stands in for the film's
     std::vector<float> rgba;
     uint32_t width = 0, height = 0;
   };
+  /// What read() gives for the combined pass, without a copy, where there is such a picture; else null.
+  std::shared_ptr<const Image> shown() const;
 
+ private:
   void stop_thread();
   void launch();
   void run(RenderSettings);
@@ -96,6 +98,8 @@ class Session {
   std::string denoiser_made_for_;
   std::atomic<bool> stop_{false}, paused_{false};
   std::atomic<uint64_t> samples_done_{0};
+  double sample_seconds_ = 0.0;  // of the thread alone: what a sample took last, which decides how coarse a start is
+  static constexpr uint64_t kSamplesToTime = 512;
 
   mutable std::mutex mutex_;  // all below
   mutable std::condition_variable changed_;

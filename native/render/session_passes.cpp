@@ -41,8 +41,10 @@ void Session::render_passes(const RenderSettings& settings, Renderer& renderer, 
     statistics_.seconds["prepare"] = now() - begun;
     stage_ = "rendering";
   }
-  const ScheduleOptions options{settings.samples, settings.viewport, settings.time_limit > 0.0f};
   const FilmSettings& f = film.settings();
+  const uint64_t pixels = uint64_t(film.width()) * film.height();
+  const ScheduleOptions options{settings.samples, settings.viewport, settings.time_limit > 0.0f,
+                                coarsest_step(pixels, sample_seconds_)};
   bool shown_filtered = false;
   uint32_t done = 0;
   double in_passes = 0.0, at_last_publish = 0.0;
@@ -57,6 +59,9 @@ void Session::render_passes(const RenderSettings& settings, Renderer& renderer, 
     if (plan.step == 1) done = plan.first + plan.count;
     const double seconds = now() - begun;
     in_passes += seconds;
+    uint64_t samples = 0;
+    for (const PixelRequest& request : requests) samples += sample_count(request);
+    if (samples >= kSamplesToTime && !paused_) sample_seconds_ = seconds / double(samples);
     BelievedError error;
     if (plan.step == 1 && (error_is_due(done) || (done >= 2 && done >= settings.samples)))
       error = film.believed_error();
@@ -75,7 +80,7 @@ void Session::render_passes(const RenderSettings& settings, Renderer& renderer, 
       if (filter_now) {
         publish(settings, film, 1, true);
         shown_filtered = true;
-      } else if (!shown_filtered && (index <= kCoarsePasses || last || now() - at_last_publish > 0.05)) {
+      } else if (!shown_filtered && (plan.step > 1 || done <= 1 || last || now() - at_last_publish > 0.05)) {
         publish(settings, film, plan.step, false);
         at_last_publish = now();
       }

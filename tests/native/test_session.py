@@ -312,3 +312,18 @@ def test_recorded_rays_are_those_of_the_render() -> None:
     hit = built.scene.intersect(rays["closest_origins"], rays["closest_directions"])
     assert 0.3 < np.isfinite(hit["distance"]).mean() < 1.0
     assert 0.05 < built.scene.occluded(rays["occluded_origins"], rays["occluded_targets"]).mean() < 0.95
+
+
+def test_a_viewport_starts_as_coarse_as_the_machine_needs_and_ends_with_the_same_picture() -> None:
+    _, s = session(samples=4, viewport=True, width=400, height=300)
+    pictures, first = [], []
+    for _ in range(2):  # the second start knows what a sample takes
+        s.start()
+        s.wait()
+        steps = [entry["step"] for entry in s.statistics()["passes_log"]]
+        coarse = [step for step in steps if step > 1]
+        assert coarse == [2**k for k in range(len(coarse), 0, -1)] and steps[len(coarse) :] == [1] * 4
+        first.append(steps[0])
+        pictures.append(s.read())
+    assert first[0] == 8 and first[1] <= 32
+    np.testing.assert_array_equal(*pictures)

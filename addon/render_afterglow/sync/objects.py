@@ -126,6 +126,9 @@ class ObjectTable:
         self.uses: dict[int, MeshUse] = {}
         self.next_lights: set[GroupKey] = set()
         self.override = getattr(layer, "material_override", None)
+        only_moved = updates.only_moved and not (updates.everything or self.materials.attributes_changed)
+        if only_moved and self._move(updates.moved):
+            return
         walks: dict[tuple[int, int, int], Walk] = {}
         for instance in depsgraph.object_instances:
             if not instance.show_self:
@@ -145,6 +148,29 @@ class ObjectTable:
                 walk.matrices.append(instance.matrix_world.copy())
                 walk.randoms.append(instance.random_id if instance.is_instance else random_of_name(ob.name))
         self._finish([walk for walk in walks.values() if walk.group is not None])
+
+    def _move(self, moved: list[Any]) -> bool:
+        """Moves objects without a walk, where nothing but objects that stand once and make no others moved."""
+        addresses = {ob.original.as_pointer(): ob for ob in moved}
+        found: dict[int, list[Group]] = {}
+        for (owner, parent, _), group in self.groups.items():
+            if parent in addresses or (owner in addresses and (parent or group.points is not None)):
+                return False
+            if owner in addresses:
+                found.setdefault(owner, []).append(group)
+        for address, ob in addresses.items():
+            groups = found.get(address, [])
+            if (ob.type == "LIGHT" or ob.instance_type != "NONE" or ob.particle_systems or len(groups) > 1
+                    or any(len(group.transforms) != 1 for group in groups)):
+                return False
+        for address, groups in found.items():
+            for group in groups:
+                transforms = stack_matrices([addresses[address].matrix_world.copy()])
+                if len(group.handles) and not np.array_equal(transforms, group.transforms):
+                    self.scene.set_transforms(group.handles, transforms)
+                    self.report.moved += 1
+                group.transforms = transforms
+        return True
 
     def _begin(self, instance: Any, ob: Any, data: Any, addresses: tuple[int, int, int], lights: bool) -> Walk:
         """First sight of a group: its mesh and what all of its instances share."""

@@ -55,6 +55,7 @@ class Updates:
     images: set[int] = field(default_factory=set)
     objects: bool = False      # the list of objects has to be walked
     only_moved: bool = True    # nothing but transforms changed: names, slots, flags need no look
+    moved: list[Any] = field(default_factory=list)  # evaluated objects whose transforms changed
     trees: bool = False        # a node group changed: every graph is looked at
     world: bool = False
 
@@ -83,8 +84,8 @@ def read_updates(depsgraph: Any, everything: bool) -> Updates:
             updates.materials.add(address)
         elif kind == "IMAGE":
             updates.images.add(address)
-        elif kind == "NODETREE":
-            updates.trees = True
+        elif kind == "NODETREE":  # a tree that belongs to a datablock comes with its owner
+            updates.trees = updates.trees or not getattr(datablock, "is_embedded_data", False)
         elif kind == "WORLD":
             updates.world = True
         if kind in APART:
@@ -94,6 +95,8 @@ def read_updates(depsgraph: Any, everything: bool) -> Updates:
             updates.geometry.add(address)
         if kind != "OBJECT" or update.is_updated_geometry or update.is_updated_shading or not update.is_updated_transform:
             updates.only_moved = False
+        else:
+            updates.moved.append(datablock)
         updates.others.add(address)
     if not count:
         updates.everything = True
