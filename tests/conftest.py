@@ -16,6 +16,9 @@ ROOT = Path(__file__).resolve().parent.parent
 PRESET = os.environ.get("AFTERGLOW_PRESET", "release")
 LIBRARY = Path(os.environ.get("AFTERGLOW_LIBRARY") or ROOT / "build" / PRESET / "python")
 
+# The distribution's Blender takes the first python3 on PATH for its own: not that of an active virtual environment.
+os.environ["PATH"] = os.pathsep.join(["/usr/bin", os.environ.get("PATH", "")])
+
 sys.path.insert(0, str(LIBRARY))
 sys.path.insert(0, str(ROOT / "tools"))
 

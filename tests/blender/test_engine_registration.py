@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 Run = Callable[..., dict[str, Any]]
@@ -95,3 +98,11 @@ def test_cycles_settings_are_taken_over(in_blender: Run) -> None:
     )
     assert found["values"] == [33, 7, 5.0, 0.0]
     assert found["draft"] == 64
+
+
+def test_an_active_virtual_environment_is_no_obstacle(in_blender: Run, tmp_path: Path) -> None:
+    """Debian's Blender takes the first python3 on PATH for its own, and one of a virtual environment has no numpy."""
+    subprocess.run(["/usr/bin/python3", "-m", "venv", "--without-pip", str(tmp_path / "venv")], check=True)
+    path = os.pathsep.join([str(tmp_path / "venv" / "bin"), os.environ["PATH"]])
+    found = in_blender("result(scene=hasattr(bpy.context.scene, 'afterglow'))", env={"PATH": path})
+    assert found["scene"]
