@@ -141,3 +141,27 @@ def test_the_cache_keeps_arrays_by_key(tmp_path, monkeypatch) -> None:  # noqa: 
         path.write_bytes(b"broken")
     cache.arrays({"kind": "test", "samples": 1}, make)
     assert len(made) == 3
+
+
+def test_the_first_image_of_a_new_state_is_seen_through_noise() -> None:
+    """Coarse, noisy, clipped pictures of the old and of the new state are told apart, as a viewport's screen shows them."""
+    from afterglow.bench.foundation import viewport
+
+    rng = np.random.default_rng(3)
+    old = np.full((480, 800), 0.3, np.float32) + np.linspace(0.0, 0.3, 800, dtype=np.float32)
+    new = old.copy()
+    new[160:320, 240:400] -= 0.25
+    new[280:440, 500:660] += 0.25
+
+    def shown(state: np.ndarray, samples: int, grid: int) -> np.ndarray:
+        coarse = state[::grid, ::grid]
+        light = rng.gamma(0.3 * samples, 1.0 / (0.3 * samples), coarse.shape) * coarse
+        picture = np.minimum(light, 1.0).repeat(grid, 0).repeat(grid, 1)[: state.shape[0], : state.shape[1]]
+        return np.repeat(picture[..., None], 3, 2).astype(np.float32)
+
+    before, after = shown(old, 16, 1), shown(new, 16, 1)
+    for samples, grid in ((1, 8), (1, 4), (1, 1), (4, 1)):
+        assert viewport.new_share(before, after, shown(old, samples, grid)) < 0.5
+        assert viewport.new_share(before, after, shown(new, samples, grid)) > 0.5
+    with pytest.raises(ValueError, match="too little"):
+        viewport.new_share(before, shown(old, 16, 1), before)
