@@ -44,11 +44,18 @@ def blocks(picture: NDArray[np.float32]) -> NDArray[np.float32]:
     return picture[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK, -1).mean((1, 3, 4))
 
 
+def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means of three by three blocks."""
+    rows, columns = values.shape
+    padded = np.pad(values, 1, mode="edge")
+    return np.mean([padded[y : y + rows, x : x + columns] for y in range(3) for x in range(3)], axis=0)
+
+
 def new_share(before: NDArray[np.float32], after: NDArray[np.float32], picture: NDArray[np.float32]) -> float:
     """How much of the way from the picture before to the one after a picture of the screen has gone, 0 to 1, from block means.
     Noise makes pictures darker on screen, because bright samples are cut off; how much at each brightness is learned from the
     blocks that the edit leaves alone."""
-    old, new, seen = blocks(before), blocks(after), blocks(picture)
+    old, new, seen = smooth(blocks(before)), smooth(blocks(after)), blocks(picture)
     changed = np.abs(new - old) > CHANGED
     if changed.sum() < 8:
         raise ValueError("the edit changes too little of the picture")
