@@ -9,6 +9,8 @@ Rgb transmittance(const WalkScene& walk, Ray ray, const PathContext& from, RayCo
   PathContext context = from;
   context.kind = PathContext::kShadow;
   Rgb through(1.0f);
+  const bool finite = std::isfinite(ray.t_max);
+  const Vec3 end = finite ? ray.origin + ray.direction * ray.t_max : Vec3(0.0f);
   for (;;) {
     Hit hit;
     if (!scene.rays.closest(ray, hit)) return through;
@@ -22,8 +24,12 @@ Rgb transmittance(const WalkScene& walk, Ray ray, const PathContext& from, RayCo
       if (is_black(through) || ++context.transparent_depth > walk.limits.transparent) return Rgb(0.0f);
     }
     ray.origin = offset_origin(point, ray.direction);
-    ray.t_max -= hit.t;
-    if (!(ray.t_max > 0.0f)) return through;
+    if (finite) {  // towards the same end, which lies just off the light: a step aside must not carry the ray into it
+      const Vec3 way = end - ray.origin;
+      ray.t_max = glm::dot(way, ray.direction) > 0.0f ? glm::length(way) : 0.0f;
+      if (!(ray.t_max > 0.0f)) return through;
+      ray.direction = way / ray.t_max;
+    }
     counts.shadow++;
   }
 }

@@ -65,6 +65,27 @@ def test_a_lamp_close_above_a_surface_lights_it(kind: str, height: float) -> Non
     assert error < 0.02 * expected
 
 
+@pytest.mark.parametrize("place", [0.0, 2.7484, -20.0])
+def test_light_bounces_between_two_half_transparent_sheets(place: float) -> None:
+    """A wide lamp behind two sheets close together, each transparent by t and reflecting a: the viewer's side shows
+    t² (1 + a² F / (1 − a²)) of its radiance, wherever all that stands."""
+    t, color, lamp, gap = 0.4, 0.8, 0.4, 2.4e-4
+    scene = Description("sheets", Camera(look_at((0, place - 6, 0), (0, place, 0)), 0.002))
+    scene.materials["sheet"] = node("mix_shader", fac=1 - t, shader=transparent((1, 1, 1)), shader_001=diffuse((color,) * 3))
+    scene.materials["lamp"] = emission(1.0)
+    for name, y, size in (("Front", place, 0.5), ("Back", place + gap, 0.5), ("Lamp", place + gap + lamp, 1.0)):
+        corners = [(-size, y, -size), (size, y, -size), (size, y, size), (-size, y, size)]
+        scene.add(name, quad(*corners), "lamp" if name == "Lamp" else "sheet")
+    side = 1.0 / lamp
+    root = math.sqrt(1 + side * side)
+    seen = 4 * 2 * side / root * math.atan(side / root) / (2 * math.pi)
+    a = (1 - t) * color
+    expected = t * t * (1 + a * a * seen / (1 - a * a))
+    value, error = mean(scene, samples=4096, size=8, transparent_max_bounces=64)
+    assert abs(value - expected) < 4 * error + 2e-3 * expected
+    assert error < 0.01 * expected
+
+
 @pytest.mark.parametrize("strategies", [True, False])
 def test_a_sphere_light_shines_as_a_point_does(strategies: bool) -> None:
     """Where all of it stands above the horizon, however near: no ray may count its far side, too."""
