@@ -177,17 +177,43 @@ float patch_density(const EmissivePatch& t, const Vec3& position, const Vec3& no
   return projected > 0.0f ? distance * distance / projected : 0.0f;
 }
 
+namespace {
+
+bool has_emitting_slot(const InstanceRecord& record, std::span<const uint32_t> slots, const Materials& materials) {
+  if (!record.mesh || record.mesh->triangles.empty()) return false;
+  for (uint32_t s = 0; s < record.slot_count; ++s)
+    if (materials.emits(slots[record.first_material + s])) return true;
+  return false;
+}
+
+}  // namespace
+
+bool EmissiveMeshes::touched_by(const SceneChanges& changes, const Scene& scene, const Materials& materials) const {
+  std::unordered_set<Handle> meshes, instances;
+  for (const auto* list : {&changes.meshes_added, &changes.meshes_deformed, &changes.meshes_replaced})
+    meshes.insert(list->begin(), list->end());
+  for (const auto* list : {&changes.instances_added, &changes.instances_edited, &changes.instances_removed})
+    instances.insert(list->begin(), list->end());
+  for (const MovedInstance& moved : changes.instances_moved) instances.insert(moved.instance);
+  if (std::ranges::any_of(instances, [&](Handle handle) { return sources_.contains(handle); })) return true;
+  if (meshes.empty() && instances.empty()) return false;
+  const auto slots = scene.material_slots();
+  return std::ranges::any_of(scene.instances(), [&](const InstanceRecord& record) {
+    return (instances.contains(record.handle) || meshes.contains(record.mesh_handle)) &&
+           (sources_.contains(record.handle) || has_emitting_slot(record, slots, materials));
+  });
+}
+
 void EmissiveMeshes::collect(const Scene& scene, const Materials& materials) {
   patches_.clear();
   ranges_.clear();
+  sources_.clear();
   const auto instances = scene.instances();
   const auto slots = scene.material_slots();
   for (uint32_t i = 0; i < instances.size(); ++i) {
     const InstanceRecord& record = instances[i];
-    if (!record.mesh || record.mesh->triangles.empty() || record.slot_count == 0) continue;
-    bool any = false;
-    for (uint32_t s = 0; s < record.slot_count; ++s) any |= materials.emits(slots[record.first_material + s]);
-    if (!any) continue;
+    if (!has_emitting_slot(record, slots, materials)) continue;
+    sources_.insert(record.handle);
     const Mesh& mesh = *record.mesh;
     Range range{uint32_t(patches_.size()), 0, 0};
     uint32_t triangles = 0, rectangles = 0;

@@ -5,10 +5,12 @@
 #pragma once
 
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "lights/light_tree.h"
 #include "materials/materials.h"
+#include "scene/changes.h"
 
 namespace afterglow {
 
@@ -44,6 +46,8 @@ class EmissiveMeshes {
  public:
   /// Every triangle whose material emits and may be sampled.
   void collect(const Scene&, const Materials&);
+  /// Whether these changes of meshes and instances concern any that emits or did. Materials: as at collect().
+  bool touched_by(const SceneChanges&, const Scene&, const Materials&) const;
   const std::vector<EmissivePatch>& patches() const { return patches_; }
   /// Index into patches(), or kNone.
   uint32_t find(uint32_t instance, uint32_t triangle) const;
@@ -57,6 +61,7 @@ class EmissiveMeshes {
   };
   std::vector<EmissivePatch> patches_;
   std::unordered_map<uint32_t, Range> ranges_;  // by instance
+  std::unordered_set<Handle> sources_;          // handles of instances with an emitting slot
 };
 
 }  // namespace afterglow

@@ -8,6 +8,7 @@
 
 #include "lights/emissive_mesh.h"
 #include "lights/lamp.h"
+#include "lights/lamp_bvh.h"
 #include "lights/light_tree.h"
 #include "lights/world_map.h"
 
@@ -80,7 +81,7 @@ struct Lights::State {
   const Scene* scene = nullptr;
   const Materials* materials = nullptr;
   std::vector<Lamp> lamps, suns;
-  std::vector<uint32_t> shapes;  // lamps that rays can hit
+  LampBvh lamp_bvh;  // those of the lamps that rays can hit
   EmissiveMeshes meshes;
   struct Emission {
     Rgb mean{0.0f};
@@ -108,6 +109,7 @@ struct Lights::State {
   Rgb with_graph(const Lamp& lamp, const Rgb& radiance, const Vec3& direction, const Vec2& uv) const {
     return lamp.has_graph ? radiance * materials->light(lamp.handle, lamp_local(lamp, -direction), uv) : radiance;
   }
+  bool hit_lamp(uint32_t index, const Ray&, float t_max, LightHit&, Vec2& uv) const;
   bool sample_finite(uint32_t light, const Vec3&, const Vec3&, const Vec2&, LightSample&) const;
   bool sample_sun(float u, const Vec3& position, const Vec3& normal, const Vec2&, LightSample&) const;
   bool sample_world(const Vec3& normal, const Vec2&, LightSample&) const;
@@ -115,7 +117,7 @@ struct Lights::State {
 };
 
 void Lights::State::collect_lamps(std::vector<std::string>& warnings) {
-  lamps.clear(), suns.clear(), shapes.clear();
+  lamps.clear(), suns.clear();
   for (Handle handle : scene->light_handles()) {
     const Light& light = scene->light(handle);
     std::string problem;
@@ -123,8 +125,7 @@ void Lights::State::collect_lamps(std::vector<std::string>& warnings) {
     if (!problem.empty()) warnings.push_back("Light \"" + light.name + "\" is left out: " + problem);
     if (lamp) (lamp->infinite() ? suns : lamps).push_back(*lamp);
   }
-  for (uint32_t i = 0; i < lamps.size(); ++i)
-    if (lamps[i].hittable) shapes.push_back(i);
+  lamp_bvh.build(lamps);
 }
 
 /// Mean of a light's graph over directions, for the choice of lights; a little above zero where all probes are black.
@@ -290,15 +291,12 @@ void Lights::commit(const Scene& scene, const SceneChanges& changes, const Mater
   const bool all = first || changes.everything || changes.origin;
   const bool materials_changed = !changes.materials_added.empty() || !changes.materials_edited.empty() ||
                                  !changes.materials_removed.empty() || !changes.images_edited.empty();
-  const bool geometry = !changes.meshes_added.empty() || !changes.meshes_deformed.empty() ||
-                        !changes.meshes_replaced.empty() || !changes.meshes_removed.empty() ||
-                        !changes.instances_added.empty() || !changes.instances_removed.empty() ||
-                        !changes.instances_edited.empty() || !changes.instances_moved.empty();
   const bool lights =
       !changes.lights_added.empty() || !changes.lights_edited.empty() || !changes.lights_removed.empty();
   if (all || lights) s.collect_lamps(warnings);
-  if (all || materials_changed || geometry) s.collect_emission();
-  if (all || lights || materials_changed || geometry) s.build_tree();
+  const bool emitters = all || materials_changed || s.meshes.touched_by(changes, scene, materials);
+  if (emitters) s.collect_emission();
+  if (lights || emitters) s.build_tree();
   if (all || changes.world || !changes.images_edited.empty()) s.build_world();
 }
 
@@ -316,7 +314,7 @@ uint32_t Lights::count() const {
 }
 
 size_t Lights::bytes() const {
-  return state_->tree.bytes() + state_->meshes.bytes() + state_->world_map.bytes() +
+  return state_->tree.bytes() + state_->lamp_bvh.bytes() + state_->meshes.bytes() + state_->world_map.bytes() +
          (state_->lamps.capacity() + state_->suns.capacity()) * sizeof(Lamp);
 }
 
@@ -383,25 +381,44 @@ float Lights::density_of_world(const Vec3& position, const Vec3& normal, const V
   return shares.weight[kWorld] * s.world_density(normal, direction);
 }
 
+bool Lights::State::hit_lamp(uint32_t index, const Ray& ray, float t_max, LightHit& out, Vec2& uv) const {
+  const Lamp& lamp = lamps[index];
+  LampHit hit;
+  if (!(lamp.visibility & ray.mask) || !intersect_lamp(lamp, ray.origin, ray.direction, ray.t_min, t_max, hit))
+    return false;
+  out = {hit.t, hit.radiance, index, lamp.visibility};
+  uv = hit.uv;
+  return true;
+}
+
 bool Lights::intersect(const Ray& ray, LightHit& out) const {
   const State& s = *state_;
   out = LightHit{};
   float nearest = ray.t_max;
   Vec2 uv(0.0f);
-  for (uint32_t i : s.shapes) {
-    const Lamp& lamp = s.lamps[i];
-    LampHit hit;
-    if (!(lamp.visibility & ray.mask) || !intersect_lamp(lamp, ray.origin, ray.direction, ray.t_min, nearest, hit))
-      continue;
-    nearest = hit.t, uv = hit.uv;
-    out = {hit.t, hit.radiance, i, lamp.visibility};
-  }
+  s.lamp_bvh.meet(ray, ray.t_max, [&](uint32_t lamp) {
+    if (s.hit_lamp(lamp, ray, nearest, out, uv)) nearest = out.t;
+    return nearest;
+  });
   if (out.light == kNone) return false;
   out.radiance = s.with_graph(s.lamps[out.light], out.radiance, ray.direction, uv);
   return true;
 }
 
-bool Lights::has_shapes() const { return !state_->shapes.empty(); }
+void Lights::visit_hits(const Ray& ray, void (*visit)(const void*, const LightHit&), const void* context) const {
+  const State& s = *state_;
+  s.lamp_bvh.meet(ray, ray.t_max, [&](uint32_t lamp) {
+    LightHit hit;
+    Vec2 uv;
+    if (s.hit_lamp(lamp, ray, ray.t_max, hit, uv)) {
+      hit.radiance = s.with_graph(s.lamps[lamp], hit.radiance, ray.direction, uv);
+      visit(context, hit);
+    }
+    return ray.t_max;
+  });
+}
+
+bool Lights::has_shapes() const { return !state_->lamp_bvh.empty(); }
 
 bool Lights::has_suns() const {
   return std::any_of(state_->suns.begin(), state_->suns.end(), [](const Lamp& sun) { return sun.hittable; });

@@ -48,6 +48,12 @@ class Lights {
   float density_of_world(const Vec3& position, const Vec3& normal, const Vec3& direction) const;
   /// The nearest shaped light before t_max, or false. Suns and the world are at infinity: see escaped().
   bool intersect(const Ray&, LightHit&) const;
+  /// Calls visit(LightHit) for every shaped light that the ray meets, each once, in no order of distance.
+  template <class Visit>
+  void for_each_hit(const Ray& ray, const Visit& visit) const {
+    visit_hits(
+        ray, [](const void* v, const LightHit& hit) { (*static_cast<const Visit*>(v))(hit); }, &visit);
+  }
   bool has_shapes() const;
   /// Radiance of suns with an angle towards a ray that left the scene (the world is Materials::world), with each one's
   /// density.
@@ -57,6 +63,7 @@ class Lights {
   uint32_t sun_count() const;
 
  private:
+  void visit_hits(const Ray&, void (*visit)(const void*, const LightHit&), const void* context) const;
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -147,17 +147,13 @@ class Walker {
     Ray ray = path.ray;
     ray.t_max = t_max;
     const uint32_t mask = visibility_of(path.context.kind);
-    LightHit hit;
-    for (int i = 0; i < 256 && scene_.lights.intersect(ray, hit); ++i) {
-      if (hit.visibility & mask) {
-        const float other = path.density > 0.0f ? scene_.lights.density_of_light(path.position, path.light_normal,
-                                                                                 path.ray.direction, hit)
-                                                : 0.0f;
-        visitor.emitted(path, hit.radiance * (other > 0.0f ? power_heuristic(path.density, other) : 1.0f));
-      }
-      ray.t_min = std::nextafter(hit.t * (1.0f + 1e-6f), kInfinity);
-      hit = LightHit{};
-    }
+    scene_.lights.for_each_hit(ray, [&](const LightHit& hit) {
+      if (!(hit.visibility & mask)) return;
+      const float other = path.density > 0.0f ? scene_.lights.density_of_light(path.position, path.light_normal,
+                                                                               path.ray.direction, hit)
+                                              : 0.0f;
+      visitor.emitted(path, hit.radiance * (other > 0.0f ? power_heuristic(path.density, other) : 1.0f));
+    });
   }
 
   template <class Visitor>
