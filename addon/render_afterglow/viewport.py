@@ -288,7 +288,11 @@ class Viewport:
         scale_y = context.region.height / self.view.height
         if self.picture is not None:
             self.picture.draw(x0 * scale_x, y0 * scale_y, width * scale_x, height * scale_y)
-        engine.update_stats("Afterglow", view_status(self.settings, progress))
+        engine.update_stats("Afterglow", view_status(self._method(), progress))
+
+    def _method(self) -> str:
+        """The method that runs, which is the engine's choice where the setting says so."""
+        return str(self.session.statistics()["method"] or self.settings["method"])
 
     def fail(self, engine: Any, text: str) -> None:
         """Tells what is wrong in the viewport's status; the last picture stays."""
@@ -312,10 +316,9 @@ def same_camera(one: dict[str, Any], other: dict[str, Any]) -> bool:
     return all(np.array_equal(one[name], other[name]) for name in one)
 
 
-def view_status(settings: dict[str, Any], progress: dict[str, Any]) -> str:
+def view_status(method: str, progress: dict[str, Any]) -> str:
     """The viewport's status line: method, samples, believed error, time."""
-    method = str(settings["method"]).replace("_", " ").title()
-    parts = [method, f"{progress['samples']} samples"]
+    parts = [method.replace("_", " ").title(), f"{progress['samples']} samples"]
     if progress.get("error") is not None:
         parts.append(f"error {progress['error']:.1%}")
     parts.append(f"{progress['elapsed']:.1f} s")

@@ -118,7 +118,7 @@ def chart_of(report: Any) -> chart.Chart:
     width, height = report.resolution
     it = chart.Chart(f"{report.scene}, {width} x {height}")
     for point in report.points:
-        it.lines.setdefault(point.method, []).append(
+        it.lines.setdefault(point.method.replace("_", " ").title(), []).append(
             chart.Point(point.seconds, point.error, point.error_bar, point.setting, point.in_use)
         )
     return it

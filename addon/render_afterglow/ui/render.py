@@ -31,9 +31,9 @@ class AFTERGLOW_RENDER_PT_sampling(PropertiesPanel, bpy.types.Panel):
         if backend.problem:
             wrap(layout, backend.problem, "ERROR")
         layout.prop(settings, "method")
-        row = layout.row(align=True)
+        grid = layout.grid_flow(columns=2, align=True, row_major=True)
         for identifier, label, _description, _number in QUALITY_ITEMS:
-            row.operator("afterglow.quality", text=label).quality = identifier
+            grid.operator("afterglow.quality", text=label).quality = identifier
         layout.operator("afterglow.copy_cycles_settings")
 
 
