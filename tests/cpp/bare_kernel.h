@@ -1,30 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The path tracer of a diffuse scene under emissive meshes, written down by itself: what the kernel that a scene's Effects
-// choose is held against. No lens, world, lamp, clamp, holdout, transparency, local view, stop or kind of ray is known here,
-// materials are a table of colours, and the one lamp is asked without choosing among lights. Its picture is that of the
-// chosen kernel to the last bit, so that both count the same work (Kajiya 1986; Veach 1995 for the weights).
+// choose is held against. No lens, world, lamp, clamp, holdout, transparency, local view, stop, pass or lobe but Lambert's is
+// known here. What every kernel asks of the scene, it asks of the same tables: the nearest hit and its facts, the material's
+// lobes, a light. Its picture is that of the chosen kernel to the last bit, so that both count the same work (Kajiya 1986;
+// Veach 1995 for the weights).
 #pragma once
 
 #include <cstring>
-#include <vector>
 
-#include "lights/emissive_mesh.h"
 #include "methods/path_tracing/kernel.h"
 
 namespace afterglow::bare {
-
-/// What a diffuse scene has of each material, by dense index.
-struct Paint {
-  Rgb albedo{0.0f}, emission{0.0f};
-};
 
 struct Input {
   const CommittedScene& scene;
   const CameraRays& camera;
   Film& film;
-  std::vector<Paint> paints;
-  EmissivePatch lamp;
-  Rgb lamp_radiance{0.0f};
   uint32_t diffuse_bounces = 12, seed = 0;
 };
 
@@ -33,33 +24,31 @@ struct Path {
   Rgb throughput{1.0f}, light{0.0f};
   Vec3 position{0.0f}, normal{0.0f};
   float density = 0.0f;
+  PathContext context;
 };
 
 /// Light run into, weighted against the chance that it had been looked for.
 inline void emitted(const Input& in, Path& path, const SurfacePoint& point, const Rgb& emission) {
-  float weight = 1.0f;
-  if (path.density > 0.0f) {
-    const Vec3 to_point = point.position - path.position;
-    const float distance = glm::length(to_point);
-    const float other =
-        distance > 0.0f ? patch_density(in.lamp, path.position, path.normal, to_point / distance, distance) : 0.0f;
-    weight = power_heuristic(path.density, other);
-  }
+  const float weight =
+      path.density > 0.0f
+          ? power_heuristic(path.density, in.scene.lights.density_of_triangle(path.position, path.normal, point))
+          : 1.0f;
   path.light += glm::max(path.throughput * (emission * weight), Rgb(0.0f));
 }
 
-inline void look_for_light(const Input& in, Path& path, const SurfacePoint& point, const Rgb& albedo, const Vec2& u,
-                           RayCounts& counts) {
-  PatchSample s;
-  if (!sample_patch(in.lamp, point.position, point.normal, u, s) || !(s.density > 0.0f)) return;
+inline void look_for_light(const Input& in, Path& path, const SurfacePoint& point, const Rgb& albedo, float u_light,
+                           const Vec2& u, RayCounts& counts) {
+  LightSample s;
+  if (!in.scene.lights.sample(point.position, point.normal, u_light, u, s)) return;
   const float cosine = glm::dot(point.normal, s.direction);
   if (cosine <= 0.0f || glm::dot(point.face_normal, s.direction) <= 0.0f) return;
   const float density = cosine * kInvPi;
-  const Rgb arriving = in.lamp_radiance * (power_heuristic(s.density, density) / s.density);
+  const Rgb arriving = s.radiance * (power_heuristic(s.density, density) / s.density);
   Ray ray;
   ray.origin = offset_origin(point, s.direction);
-  ray.direction = s.direction;
-  ray.t_max = shadow_end(ray.origin, s.distance);
+  const Vec3 way = s.direction * s.distance + s.margin - (ray.origin - point.position);
+  ray.t_max = glm::length(way);
+  ray.direction = way / ray.t_max;
   ray.mask = kVisibleShadow;
   counts.shadow++;
   if (in.scene.rays.occluded(ray)) return;
@@ -89,16 +78,17 @@ inline void walk(const Input& in, Path& path, Sampler& sampler, RayCounts& count
     Hit hit;
     if (!in.scene.rays.closest(path.ray, hit)) return;
     const SurfacePoint point = surface_point(in.scene.scene, path.ray, hit, false);
-    const Paint& paint = in.paints[point.material];
-    if (!is_black(paint.emission)) emitted(in, path, point, paint.emission);
-    if (vertex > in.diffuse_bounces) return;
-    sampler.set_dimension(kCameraDimensions + vertex * kVertexDimensions + 1);
-    const float u_end = sampler.next1();
-    const Vec2 u_lamp = sampler.next2();
-    if (is_black(paint.albedo)) return;
-    look_for_light(in, path, point, paint.albedo, u_lamp, counts);
+    Surface surface;
+    in.scene.materials.shade(in.scene.scene, point, path.context, surface);
+    if (!is_black(surface.emission)) emitted(in, path, point, surface.emission);
+    if (vertex > in.diffuse_bounces || !surface.count) return;
+    sampler.set_dimension(kCameraDimensions + vertex * kVertexDimensions);
+    const float u_light = sampler.next1(), u_end = sampler.next1();
+    const Vec2 u_on_light = sampler.next2();
+    const Rgb& albedo = surface.lobes[0].weight;
+    look_for_light(in, path, point, albedo, u_light, u_on_light, counts);
     sampler.set_dimension(kCameraDimensions + vertex * kVertexDimensions + 6);
-    if (!scatter(path, point, paint.albedo, sampler.next2())) return;
+    if (!scatter(path, point, albedo, sampler.next2())) return;
     const float p = survival(path.throughput, vertex + 1, 0);
     if (p < 1.0f) {
       path.throughput /= p;

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <cstring>
 #include <functional>
-#include <map>
 
 #include "bare_kernel.h"
 #include "transport/committed_scene.h"
@@ -15,12 +14,11 @@ namespace {
 
 using Corners = std::array<Vec3, 4>;
 
-constexpr uint32_t kSize = 48, kSamples = 16, kSeed = 7;
+constexpr uint32_t kSize = 48, kSamples = 16, kSeed = 7, kBounces = 12;
 
-Handle add_paint(Scene& scene, const char* name, const bare::Paint& paint) {
-  const bool lamp = !is_black(paint.emission);
-  Node node{lamp ? "emission" : "diffuse_bsdf", name, {{"color", Vec3(lamp ? paint.emission : paint.albedo)}}, {}};
-  if (lamp) node.inputs["strength"] = 1.0f;
+Handle add_material(Scene& scene, const char* name, const char* type, const Rgb& color) {
+  Node node{type, name, {{"color", Vec3(color)}}, {}};
+  if (node.type == "emission") node.inputs["strength"] = 1.0f;
   Material material;
   material.name = name;
   material.graph = {{node}, {0, "shader"}};
@@ -53,27 +51,26 @@ std::vector<Corners> block(const Vec3& low, const Vec3& high) {
           {at(1, 0, 0), at(1, 1, 0), at(1, 1, 1), at(1, 0, 1)}};
 }
 
-/// The Cornell box (Goral et al. 1984), and its paints by handle.
-std::map<Handle, bare::Paint> build(Scene& scene) {
-  const bare::Paint white{{0.725f, 0.71f, 0.68f}, Rgb(0.0f)}, red{{0.63f, 0.065f, 0.05f}, Rgb(0.0f)},
-      green{{0.14f, 0.45f, 0.091f}, Rgb(0.0f)}, lamp{Rgb(0.0f), {18.0f, 15.3f, 10.8f}};
-  const Handle of_white = add_paint(scene, "white", white), of_red = add_paint(scene, "red", red),
-               of_green = add_paint(scene, "green", green), of_lamp = add_paint(scene, "lamp", lamp);
-  add_quads(scene, "Room", of_white,
+/// The Cornell box (Goral et al. 1984).
+void build(Scene& scene) {
+  const Handle white = add_material(scene, "white", "diffuse_bsdf", {0.725f, 0.71f, 0.68f});
+  const Handle red = add_material(scene, "red", "diffuse_bsdf", {0.63f, 0.065f, 0.05f});
+  const Handle green = add_material(scene, "green", "diffuse_bsdf", {0.14f, 0.45f, 0.091f});
+  const Handle lamp = add_material(scene, "lamp", "emission", {18.0f, 15.3f, 10.8f});
+  add_quads(scene, "Room", white,
             {{Vec3(-1, -1, 0), {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}},
              {Vec3(-1, 1, 2), {1, 1, 2}, {1, -1, 2}, {-1, -1, 2}},
              {Vec3(-1, 1, 0), {1, 1, 0}, {1, 1, 2}, {-1, 1, 2}}});
-  add_quads(scene, "Left", of_red, {{Vec3(-1, -1, 0), {-1, 1, 0}, {-1, 1, 2}, {-1, -1, 2}}});
-  add_quads(scene, "Right", of_green, {{Vec3(1, 1, 0), {1, -1, 0}, {1, -1, 2}, {1, 1, 2}}});
-  add_quads(scene, "Lamp", of_lamp,
+  add_quads(scene, "Left", red, {{Vec3(-1, -1, 0), {-1, 1, 0}, {-1, 1, 2}, {-1, -1, 2}}});
+  add_quads(scene, "Right", green, {{Vec3(1, 1, 0), {1, -1, 0}, {1, -1, 2}, {1, 1, 2}}});
+  add_quads(scene, "Lamp", lamp,
             {{Vec3(-0.3f, 0.25f, 1.98f), {0.3f, 0.25f, 1.98f}, {0.3f, -0.25f, 1.98f}, {-0.3f, -0.25f, 1.98f}}});
-  add_quads(scene, "Tall", of_white, block({-0.65f, 0.0f, 0.0f}, {-0.05f, 0.6f, 1.2f}));
-  add_quads(scene, "Low", of_white, block({0.05f, -0.65f, 0.0f}, {0.65f, -0.05f, 0.6f}));
+  add_quads(scene, "Tall", white, block({-0.65f, 0.0f, 0.0f}, {-0.05f, 0.6f, 1.2f}));
+  add_quads(scene, "Low", white, block({0.05f, -0.65f, 0.0f}, {0.65f, -0.05f, 0.6f}));
   Camera camera;
   camera.transform = DMat4(glm::dvec4(1, 0, 0, 0), glm::dvec4(0, 0, 1, 0), glm::dvec4(0, -1, 0, 0), glm::dvec4(0, -3.9, 1, 1));
   camera.window = Vec4(-0.35f, 0.35f, -0.35f, 0.35f);
   scene.set_camera(camera);
-  return {{of_white, white}, {of_red, red}, {of_green, green}, {of_lamp, lamp}};
 }
 
 int report(const Film& film, const RayCounts& counts) {
@@ -96,10 +93,8 @@ extern "C" [[gnu::noinline]] void measured(const std::function<void()>& work) { 
 int main(int count, char** arguments) {
   const char* wanted = count > 1 ? arguments[1] : "chosen";
   CommittedScene scene;
-  std::map<Handle, bare::Paint> by_handle = build(scene.scene);
-  scene.commit({.flatten = true});
-  std::vector<bare::Paint> paints;  // by dense index
-  for (const Handle handle : scene.scene.material_handles()) paints.push_back(by_handle[handle]);
+  build(scene.scene);
+  scene.commit({.flatten = RayCaster::Flatten::kAlways});
   FilmSettings settings;
   settings.width = settings.height = kSize;
   Film film(completed(settings));
@@ -109,19 +104,12 @@ int main(int count, char** arguments) {
   request.width = request.height = uint16_t(kSize);
   request.count = kSamples;
   if (!std::strcmp(wanted, "bare")) {
-    EmissiveMeshes lamps;
-    lamps.collect(scene.scene, scene.materials);
-    if (lamps.patches().size() != 1) {
-      std::printf("the lamp is not one rectangle but %zu patches\n", lamps.patches().size());
-      return 1;
-    }
-    const EmissivePatch lamp = lamps.patches()[0];
-    const bare::Input input{scene, camera, film, paints, lamp, paints[lamp.material].emission, 12, kSeed};
+    const bare::Input input{scene, camera, film, kBounces, kSeed};
     measured([&] { bare::render(input, request, counts); });
     return report(film, counts);
   }
   WalkLimits limits;
-  limits.max_bounces = limits.diffuse = 12;
+  limits.max_bounces = limits.diffuse = kBounces;
   const path_tracing::KernelInput input{.walk = {scene, limits, nullptr, false},
                                         .camera = camera,
                                         .film = film,
