@@ -23,7 +23,7 @@ class Owner:
         return tuple(thing.original.as_pointer() if thing is not None else 0 for thing in (self.ob, self.parent))  # type: ignore[return-value]
 
     def places(self, instancer: bool) -> list[Any]:
-        """Where a property is looked for, in this order."""
+        """Where a property is looked for, in this order. instancer: what made the instance comes first."""
         places = [self.parent] if instancer and self.parent is not None else []
         return [*places, self.ob, getattr(self.ob, "data", None)]
 

@@ -179,7 +179,7 @@ class MaterialTable:
             self._reads_matrix = True  # nobody tells when it changes: read again with each sync
             return property_of(self._view, name)
         self._reads_owner = True
-        return property_of(self._owner.places(kind == "INSTANCER"), name)
+        return property_of(self._owner.places(kind == "INSTANCER" or name == "color"), name)  # instances wear their maker's colour
 
     def _matrix(self, ob: Any) -> list[list[float]]:
         self._reads_matrix = True

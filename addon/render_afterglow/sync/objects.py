@@ -225,7 +225,7 @@ class ObjectTable:
             pairs = [self.materials.handle(material, ob.name, use.is_points, Owner(ob, parent)) for material in self._slots(ob, data)]
             bits, holdout, catcher = object_visibility(ob, parent, self.layer)
             properties = {"name": ob.name, "materials": tuple(handle for _, handle in pairs), "object_index": ob.pass_index,
-                          "visibility": bits, "holdout": holdout, "shadow_catcher": catcher, "color": tuple(ob.color)}
+                          "visibility": bits, "holdout": holdout, "shadow_catcher": catcher, "color": tuple((parent or ob).color)}
             group = Group(key[1] or key[0], data.as_pointer(), properties, tuple(address for address, _ in pairs))
             if old is not None:
                 group.handles, group.transforms, group.randoms = old.handles, old.transforms, old.randoms
