@@ -334,3 +334,48 @@ def test_nothing_of_a_render_stays_in_memory(in_blender: Run, box: Path) -> None
     )
     assert found["alive"] == [] and found["made"] == 12
     assert found["kept"] == 4 and found["difference"] == 0
+
+
+def test_what_cannot_be_rendered_is_left_out_with_a_warning_that_names_it(in_blender: Run) -> None:
+    found = in_blender(
+        """
+        import os
+        from importlib import import_module
+        store = addon('store')
+        s = scene(32, 24, samples=2)
+        cube, light = bpy.data.objects['Cube'], bpy.data.lights[0]
+        pictures, warned = [], {}
+        def look(name):
+            pictures.append(render())
+            warned[name] = store.statistics(s)['warnings']
+        light.energy = float('nan'); look('light'); light.energy = 100
+        kept = cube.data.vertices[0].co.copy()
+        cube.data.vertices[0].co = (float('nan'),) * 3; look('mesh'); cube.data.vertices[0].co = kept
+        cube.scale = (0, 0, 0); look('transform'); cube.scale = (1, 1, 1)
+        cube.is_shadow_catcher = True
+        bpy.context.view_layer.use_pass_cryptomatte_object = True
+        tree = s.world.node_tree
+        volume = tree.nodes.new('ShaderNodeVolumeScatter')
+        tree.links.new(volume.outputs[0], next(n for n in tree.nodes if n.type == 'OUTPUT_WORLD').inputs['Volume'])
+        look('unsupported')
+        broken = os.path.join(os.path.dirname(os.environ['AFTERGLOW_RESULT']), 'broken.png')
+        with open(broken, 'wb') as file: file.write(b'\\x89PNG\\r\\n\\x1a\\nno picture')
+        for name, path in (('broken', broken), ('missing', broken + '.no')):
+            image = bpy.data.images.new(name, 4, 4); image.source = 'FILE'; image.filepath = path
+            nodes = cube.active_material.node_tree
+            texture = nodes.nodes.new('ShaderNodeTexImage'); texture.image = image
+            nodes.links.new(texture.outputs[0], nodes.nodes['Principled BSDF'].inputs['Base Color'])
+            look(name)
+        result(finite=all(bool(np.isfinite(p).all()) for p in pictures), warned=warned,
+               magenta=[p[12, 16].tolist() for p in pictures[-2:]])
+        """
+    )
+    assert found["finite"]
+    said = {name: "\n".join(texts) for name, texts in found["warned"].items()}
+    assert "Light" in said["light"] and "left out" in said["light"]
+    assert "Cube" in said["mesh"] and "Cube" in said["transform"]
+    for words in ("shadow catcher", "Cryptomatte", "World 'World'"):
+        assert words in said["unsupported"], said
+    assert "broken" in said["broken"] and "missing" in said["missing"]
+    for red, green, blue, _ in found["magenta"]:
+        assert min(red, blue) > 3 * green, found

@@ -224,6 +224,8 @@ class ObjectTable:
             parent = instance.parent if instance.is_instance else None
             pairs = [self.materials.handle(material, ob.name, use.is_points, Owner(ob, parent)) for material in self._slots(ob, data)]
             bits, holdout, catcher = object_visibility(ob, parent, self.layer)
+            if catcher:
+                self.warn(f"Object '{ob.name}': shadow catchers are not supported yet: shown as an ordinary object")
             properties = {"name": ob.name, "materials": tuple(handle for _, handle in pairs), "object_index": ob.pass_index,
                           "visibility": bits, "holdout": holdout, "shadow_catcher": catcher, "color": tuple((parent or ob).color)}
             group = Group(key[1] or key[0], data.as_pointer(), properties, tuple(address for address, _ in pairs))
@@ -375,11 +377,11 @@ class ObjectTable:
         transform = stack_matrices([instance.matrix_world.copy()])[0]
         try:
             arguments = read_light(data, transform, self.materials.context(f"Light '{ob.name}'"), bits)
-        except Exception as error:  # noqa: BLE001
-            self.warn(f"Light '{ob.name}': cannot be read ({error}): left out")
-            return
-        arguments["name"] = ob.name
-        self._store_light(key, arguments)
+            arguments["name"] = ob.name
+            self._store_light(key, arguments)
+        except Exception as error:  # noqa: BLE001  the render goes on without the light
+            self.warn(f"Light '{ob.name}': cannot be used ({error}): left out")
+            self.next_lights.discard(key)
 
     def _store_light(self, key: GroupKey, arguments: dict[str, Any]) -> None:
         self.next_lights.add(key)
@@ -394,7 +396,7 @@ class ObjectTable:
             handle = known.handle
         else:
             if known is not None:
-                self.scene.remove_light(known.handle)
+                self.scene.remove_light(self.lights.pop(key).handle)
             handle = self.scene.add_light(**arguments)
         self.lights[key] = LightEntry(handle, kind, sign, images)
 

@@ -240,13 +240,13 @@ def compile_tree(tree: Any, target: str, context: Context) -> Graph:
     if output is None or output.mute:
         return {"nodes": [], "surface": None}
     view = NodeView(compiler, output, ())
-    volume = target == "material" and view.linked("Volume")
+    volume = target in {"material", "world"} and view.linked("Volume")
     if volume:
         context.warn_once("volumes are not supported yet: left out")
     if target == "material" and view.linked("Displacement"):
         compiler.normal = displacement_as_bump(compiler, view)
     surface = as_shader(compiler, view.input("Surface")) if view.linked("Surface") else None
-    if surface is None and volume:  # nothing but a volume: one looks through its hull
+    if surface is None and volume and target == "material":  # nothing but a volume: one looks through its hull
         surface = compiler.link("shader", "transparent_bsdf", inputs={"color": (1.0, 1.0, 1.0)})
     return {"nodes": compiler.nodes, "surface": surface}
 
