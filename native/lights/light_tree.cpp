@@ -8,6 +8,8 @@
 #include <array>
 #include <numeric>
 
+#include "base/parallel.h"
+
 namespace afterglow {
 
 namespace {
@@ -199,31 +201,58 @@ void LightTree::build(std::span<const LightBounds> lights) {
   place_.resize(lights.size());
   leaf_.assign(lights.size(), 0);
   if (lights.empty()) return;
-  nodes_.reserve(lights.size() / 2 + 1);
+  // The upper part here, down to branches that are built side by side, each into nodes of its own; the same cuts on any
+  // number of threads.
   nodes_.emplace_back();
-  build_node(0, 0, uint32_t(lights.size()));
+  std::vector<Branch> branches;
+  build_node(nodes_, {0, 0, uint32_t(lights.size())}, &branches);
+  std::vector<std::vector<Node>> built(branches.size());
+  parallel_blocks(branches.size(), 1, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      built[i].emplace_back();
+      build_node(built[i], {0, branches[i].begin, branches[i].end}, nullptr);
+    }
+  });
+  for (size_t i = 0; i < branches.size(); ++i) append(branches[i].node, built[i]);
+  for (uint32_t node = 0; node < nodes_.size(); ++node)
+    if (nodes_[node].count) std::fill_n(leaf_.begin() + nodes_[node].first, nodes_[node].count, node);
   columns_.fill(lights_);
   for (uint32_t place = 0; place < order_.size(); ++place) place_[order_[place]] = place;
 }
 
-uint32_t LightTree::build_node(uint32_t node, uint32_t begin, uint32_t end) {
-  LightBounds all;
-  for (uint32_t i = begin; i < end; ++i) all = united(all, lights_[i]);
-  nodes_[node].bounds = all;
-  const bool root = node == 0;
-  if (end - begin <= (root ? kSingleLeaf : kLeafSize)) {
-    nodes_[node].first = begin, nodes_[node].count = end - begin;
-    std::fill(leaf_.begin() + begin, leaf_.begin() + end, node);
-    return node;
+/// Puts a branch, whose nodes count from 0, in the place of a node.
+void LightTree::append(uint32_t node, const std::vector<Node>& branch) {
+  const uint32_t offset = uint32_t(nodes_.size()) - 1;  // of all its nodes but the first
+  const auto moved = [&](uint32_t index) { return index ? index + offset : node; };
+  const uint32_t parent = nodes_[node].parent;
+  nodes_.resize(nodes_.size() + branch.size() - 1);
+  for (uint32_t i = 0; i < branch.size(); ++i) {
+    Node& to = nodes_[moved(i)];
+    to = branch[i];
+    to.parent = i ? moved(to.parent) : parent;
+    if (!to.count) to.first = moved(to.first);
   }
-  const uint32_t middle = split(begin, end, all);
-  const uint32_t first = uint32_t(nodes_.size());
-  nodes_.resize(nodes_.size() + 2);
-  nodes_[node].first = first;
-  nodes_[first].parent = nodes_[first + 1].parent = node;
-  build_node(first, begin, middle);
-  build_node(first + 1, middle, end);
-  return node;
+}
+
+/// Builds the node and all below it. branches: where it is small enough for one thread, it is noted there instead.
+void LightTree::build_node(std::vector<Node>& nodes, const Branch& of, std::vector<Branch>* branches) {
+  const uint32_t count = of.end - of.begin;
+  const bool whole = count == lights_.size();
+  if (branches && !whole && count <= kBranchSize) return branches->push_back(of);
+  LightBounds all;
+  for (uint32_t i = of.begin; i < of.end; ++i) all = united(all, lights_[i]);
+  nodes[of.node].bounds = all;
+  if (count <= (whole ? kSingleLeaf : kLeafSize)) {
+    nodes[of.node].first = of.begin, nodes[of.node].count = count;
+    return;
+  }
+  const uint32_t middle = split(of.begin, of.end, all);
+  const uint32_t first = uint32_t(nodes.size());
+  nodes.resize(nodes.size() + 2);
+  nodes[of.node].first = first;
+  nodes[first].parent = nodes[first + 1].parent = of.node;
+  build_node(nodes, {first, of.begin, middle}, branches);
+  build_node(nodes, {first + 1, middle, of.end}, branches);
 }
 
 uint32_t LightTree::split(uint32_t begin, uint32_t end, const LightBounds& all) {

@@ -56,7 +56,13 @@ class LightTree {
   using Weights = float[16];
   /// Estimates of the `count` lights from place `first` on; their sum.
   float weigh(uint32_t first, uint32_t count, const Vec3& position, const Vec3& normal, Weights&) const;
-  uint32_t build_node(uint32_t node, uint32_t begin, uint32_t end);
+  /// A node to be built over lights_[begin, end).
+  struct Branch {
+    uint32_t node, begin, end;
+  };
+  static constexpr uint32_t kBranchSize = 4096;
+  void build_node(std::vector<Node>& nodes, const Branch&, std::vector<Branch>* branches);
+  void append(uint32_t node, const std::vector<Node>& branch);
   uint32_t split(uint32_t begin, uint32_t end, const LightBounds& all);
 
   std::vector<Node> nodes_;
