@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from . import test_engine_images
 from .conftest import HERE, write_script
 
 VERSIONS = os.environ.get("AFTERGLOW_OFFICIAL", "4.5 5.0").split()
@@ -132,3 +133,7 @@ def test_animation_failure_panels(official: Callable[..., dict[str, Any]]) -> No
     assert found["after"] and not found["left"]
     assert {"DATA_PT_lens", "RENDER_PT_color_management", "AFTERGLOW_RENDER_PT_sampling"} <= set(found["panels"])
     assert "Traceback" not in found["output"], found["output"][-4000:]
+
+
+def test_every_kind_of_image(official: Callable[..., dict[str, Any]]) -> None:
+    test_engine_images.check(official(test_engine_images.SCRIPT))
