@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -28,8 +29,6 @@ def parity(request: pytest.FixtureRequest, tmp_path: Path, resources: Path) -> C
     """parity(text): runs it in that Blender after `from parity_tools import *`; what it gave to `result`."""
 
     def run(text: str) -> dict[str, Any]:
-        import textwrap
-
         text = HEAD + textwrap.dedent(text)
         if request.param == "3.4":
             return request.getfixturevalue("in_blender")(text)
