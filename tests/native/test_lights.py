@@ -358,9 +358,9 @@ def test_ten_thousand_lights_are_quick() -> None:
     def seconds(s: afterglow.Scene) -> float:
         best = 1e9
         for _ in range(3):
-            start = time.perf_counter()
+            start = time.process_time()
             afterglow.light_sample(s, NONE, UP, u)
-            best = min(best, time.perf_counter() - start)
+            best = min(best, time.process_time() - start)
         return best
 
     assert seconds(scene) < 6 * seconds(few)  # a hundred times as many
@@ -368,7 +368,9 @@ def test_ten_thousand_lights_are_quick() -> None:
 
 def scene_commit_seconds(scene: afterglow.Scene) -> float:
     light = scene.add_light("point", at(0, 0, 1), name="one more", color=(1, 1, 1), power=1.0)
-    seconds = float(scene.commit()["seconds"])
+    start = time.process_time()  # of the processor: what else the machine does is not measured
+    scene.commit()
+    seconds = time.process_time() - start
     scene.remove_light(light)
     return seconds
 
