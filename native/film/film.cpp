@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "base/parallel.h"
+
 namespace afterglow {
 
 namespace {
@@ -17,10 +19,6 @@ uint32_t stored_floats(Pass pass) {
     default:
       return pass_info(pass).channels;
   }
-}
-
-uint32_t batch_samples(uint32_t samples, uint32_t batch) {
-  return samples / kBatchCount + (batch < samples % kBatchCount ? 1u : 0u);
 }
 
 }  // namespace
@@ -86,19 +84,6 @@ void Film::add(uint32_t x, uint32_t y, const float* sums, uint32_t samples) {
   counts_[pixel] += samples;
 }
 
-float standard_error(const float* batch_sums, uint32_t samples) {
-  const uint32_t batches = std::min<uint32_t>(samples, kBatchCount);
-  if (batches < 2) return 0.0f;
-  double mean = 0.0, variance = 0.0;
-  for (uint32_t b = 0; b < batches; ++b) mean += batch_sums[b];
-  mean /= samples;
-  for (uint32_t b = 0; b < batches; ++b) {
-    const double n = batch_samples(samples, b), off = batch_sums[b] / n - mean;
-    variance += n * off * off;
-  }
-  return float(std::sqrt(variance / (double(samples) * (batches - 1))));
-}
-
 void Film::read_pixel(Pass pass, const float* sums, uint32_t samples, float* out) const {
   const float scale = samples ? 1.0f / float(samples) : 0.0f, exposed = scale * settings_.exposure;
   const float* from = layout_[pass] >= 0 ? sums + layout_[pass] : nullptr;
@@ -145,9 +130,6 @@ void Film::read_pixel(Pass pass, const float* sums, uint32_t samples, float* out
     case Pass::kSampleCount:
       out[0] = float(samples);
       break;
-    case Pass::kError:
-      out[0] = standard_error(sums + layout_[Pass::kBatches], samples) * settings_.exposure;
-      break;
     case Pass::kBatches:
       for (uint32_t b = 0; b < kBatchCount; ++b) {
         const uint32_t n = batch_samples(samples, b);
@@ -160,67 +142,77 @@ void Film::read_pixel(Pass pass, const float* sums, uint32_t samples, float* out
 }
 
 void Film::read(Pass pass, float* out, uint32_t step) const {
-  const size_t channels = pass_info(pass).channels;
-  const uint32_t w = width(), h = height();
+  if (pass == Pass::kError) return read_error(out, step);
+  // Rows that are shown as an earlier one stay in that one's block.
+  parallel_blocks(height(), std::max(step, 16u) / step * step, [&](size_t begin, size_t end) {
+    for (size_t y = begin; y < end; ++y) read_row(pass, out, uint32_t(y), step);
+  });
+}
+
+void Film::read_row(Pass pass, float* out, uint32_t y, uint32_t step) const {
+  const size_t channels = pass_info(pass).channels, w = width();
   std::array<float, FilmLayout::kMaxFloats> sums;
-  for (uint32_t y = 0; y < h; ++y) {
-    if (y % step) {
-      float* row = out + size_t(y) * w * channels;
-      std::memcpy(row, row - size_t(w) * channels, size_t(w) * channels * sizeof(float));
+  if (y % step) {
+    float* row = out + y * w * channels;
+    std::memcpy(row, row - w * channels, w * channels * sizeof(float));
+    return;
+  }
+  for (size_t x = 0; x < w; ++x) {
+    float* to = out + (y * w + x) * channels;
+    if (x % step) {
+      std::memcpy(to, to - channels, channels * sizeof(float));
       continue;
     }
-    for (uint32_t x = 0; x < w; ++x) {
-      float* to = out + (size_t(y) * w + x) * channels;
-      if (x % step) {
-        std::memcpy(to, to - channels, channels * sizeof(float));
-        continue;
-      }
-      const size_t pixel = size_t(y) * w + x;
-      uint32_t samples;
-      {
-        const Lock lock(*this, pixel);
-        std::memcpy(sums.data(), sums_.data() + pixel * size_t(layout_.floats), size_t(layout_.floats) * sizeof(float));
-        samples = counts_[pixel];
-      }
-      if (!samples) sums.fill(0.0f);
-      read_pixel(pass, sums.data(), samples, to);
+    const size_t pixel = y * w + x;
+    uint32_t samples;
+    {
+      const Lock lock(*this, pixel);
+      std::memcpy(sums.data(), sums_.data() + pixel * size_t(layout_.floats), size_t(layout_.floats) * sizeof(float));
+      samples = counts_[pixel];
     }
+    if (!samples) sums.fill(0.0f);
+    read_pixel(pass, sums.data(), samples, to);
   }
 }
 
+uint32_t Film::batch_sums(size_t pixel, float* sums) const {
+  const Lock lock(*this, pixel);
+  std::memcpy(sums, sums_.data() + pixel * size_t(layout_.floats) + size_t(layout_[Pass::kBatches]),
+              kBatchCount * sizeof(float));
+  return counts_[pixel];
+}
+
+void Film::read_error(float* out, uint32_t step) const {
+  std::vector<PixelEstimate> pixels(counts_.size());
+  std::array<float, kBatchCount> sums;
+  for (size_t p = 0; p < pixels.size(); ++p) {
+    const uint32_t samples = batch_sums(p, sums.data());
+    pixels[p] = pixel_estimate(sums.data(), samples);
+  }
+  pool_errors(pixels, width(), height());
+  for (uint32_t y = 0; y < height(); ++y)
+    for (uint32_t x = 0; x < width(); ++x)
+      out[size_t(y) * width() + x] =
+          float(pixels[size_t(y - y % step) * width() + (x - x % step)].error * settings_.exposure);
+}
+
 BelievedError Film::believed_error() const {
-  const size_t pixels = counts_.size(), batches = size_t(layout_[Pass::kBatches]);
-  std::vector<float> means(pixels), errors(pixels);
+  const size_t pixels = counts_.size();
+  std::array<float, kBatchCount> sums;
   double total = 0.0;
   for (size_t p = 0; p < pixels; ++p) {
-    std::array<float, kBatchCount> sums;
-    uint32_t samples;
-    {
-      const Lock lock(*this, p);
-      std::memcpy(sums.data(), sums_.data() + p * size_t(layout_.floats) + batches, sizeof(sums));
-      samples = counts_[p];
-    }
-    if (samples < 2) return {};
-    float sum = 0.0f;
-    for (float s : sums) sum += s;
-    means[p] = sum / float(samples), errors[p] = standard_error(sums.data(), samples);
-    total += means[p];
+    const uint32_t samples = batch_sums(p, sums.data());
+    if (batches_begun(samples) < 2) return {};
+    total += pixel_estimate(sums.data(), samples).mean;
   }
   if (!pixels) return {};
-  BelievedError result{0.0f, 0.0f, 0.0f};
-  if (!(total > 0.0)) return result;
-  const double e = 0.5 * double(pixels) / total;
-  double sum = 0.0, squares = 0.0;
+  if (!(total > 0.0)) return {0.0f, 0.0f, 0.0f};
+  ImageError image(0.5 * double(pixels) / total);
   for (size_t p = 0; p < pixels; ++p) {
-    const double m = e * means[p], d = e * errors[p], r = d * d / (m * m + 0.01);
-    sum += r, squares += r * r;
+    const uint32_t samples = batch_sums(p, sums.data());
+    image.add(sums.data(), samples);
   }
-  const double mean = sum / double(pixels);
-  const double spread = 1.96 * std::sqrt(std::max(0.0, squares / double(pixels) - mean * mean) / double(pixels));
-  result.value = float(std::sqrt(mean));
-  result.low = float(std::sqrt(std::max(0.0, mean - spread)));
-  result.high = float(std::sqrt(mean + spread));
-  return result;
+  return image.believed();
 }
 
 }  // namespace afterglow

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "film/error_estimate.h"
 #include "film/passes.h"
 #include "film/pixel_filter.h"
 
@@ -55,12 +56,6 @@ struct FilmLayout {
   int operator[](Pass p) const { return at[size_t(p)]; }
 };
 
-/// Relative error of a whole image as its samples make believe: sqrt(mean(var / (mean² + 0.01))) of luminance, exposed
-/// to a mean of 0.5, with its own 95 % interval. Negative: not known yet.
-struct BelievedError {
-  float value = -1.0f, low = -1.0f, high = -1.0f;
-};
-
 class Film {
  public:
   explicit Film(const FilmSettings&);
@@ -82,6 +77,9 @@ class Film {
 
  private:
   class Lock;
+  uint32_t batch_sums(size_t pixel, float* sums) const;  // returns the pixel's samples
+  void read_error(float* out, uint32_t step) const;
+  void read_row(Pass, float* out, uint32_t y, uint32_t step) const;
   void read_pixel(Pass, const float* sums, uint32_t samples, float* out) const;
   FilmSettings settings_;
   FilmLayout layout_;
@@ -90,8 +88,5 @@ class Film {
   std::vector<uint32_t> counts_;
   mutable std::vector<std::atomic_flag> locks_;
 };
-
-/// Standard error of the mean of n samples from their sixteen batch sums (sample i is in batch i % 16); 0 when n < 2.
-float standard_error(const float* batch_sums, uint32_t samples);
 
 }  // namespace afterglow

@@ -41,7 +41,7 @@ std::vector<float> rgb_of(const py::object& image, const std::string& what, uint
 }
 
 py::array_t<float> denoise(const py::object& color, const py::object& albedo, const py::object& normal,
-                           const std::string& id, const std::vector<std::string>& search) {
+                           const std::string& id, const std::vector<std::string>& search, bool prefilter) {
   uint32_t width = 0, height = 0;
   const std::vector<float> c = rgb_of(color, "color", width, height);
   if (c.empty()) throw InvalidInput("denoise: color must hold pixels");
@@ -54,7 +54,8 @@ py::array_t<float> denoise(const py::object& color, const py::object& albedo, co
   input.albedo = a.empty() ? nullptr : a.data();
   input.normal = n.empty() ? nullptr : n.data();
   input.width = width, input.height = height;
-  make_denoiser(id, search)->filter(input, output);
+  input.prefilter = prefilter;
+  borrow_denoiser(id, search)->filter(input, output);
   return result;
 }
 
@@ -63,7 +64,8 @@ py::array_t<float> denoise(const py::object& color, const py::object& albedo, co
 void bind_denoise(py::module_& m) {
   m.def("denoisers", &list, py::arg("search") = std::vector<std::string>{});
   m.def("denoise", &denoise, py::arg("color"), py::arg("albedo") = py::none(), py::arg("normal") = py::none(),
-        py::kw_only(), py::arg("denoiser") = "AUTO", py::arg("search") = std::vector<std::string>{});
+        py::kw_only(), py::arg("denoiser") = "AUTO", py::arg("search") = std::vector<std::string>{},
+        py::arg("prefilter") = false);
 }
 
 }  // namespace afterglow

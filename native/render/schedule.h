@@ -35,8 +35,10 @@ inline constexpr uint32_t kCoarsestStep = 32;
 /// The pass as requests over a region, in an order that keeps neighbours together.
 std::vector<PixelRequest> pass_requests(const PassPlan&, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1);
 
-/// Whether a believed error is to be looked at after this many samples: when all batches hold the same number.
-inline bool error_is_due(uint32_t samples) { return samples >= 2 * kBatchCount && samples % kBatchCount == 0; }
+/// Whether a believed error is to be looked at after this many samples: when those batches that have begun are full.
+inline bool error_is_due(uint32_t samples) { return samples >= 16 && samples % 16 == 0; }
+/// Whether it may end the render: when all batches have samples.
+inline bool error_may_stop(uint32_t samples) { return error_is_due(samples) && samples >= kAllBatches; }
 
 /// Whether the next pass would end after the limit, if its samples take as long as those before.
 inline bool limit_reached(double elapsed, double limit, uint32_t samples, uint32_t next) {

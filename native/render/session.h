@@ -94,7 +94,7 @@ class Session {
   int edits_ = 0;
   bool restart_after_edit_ = false;
   std::thread thread_;
-  std::unique_ptr<Denoiser> denoiser_;  // of the thread alone; kept, because its first use is slow
+  std::shared_ptr<Denoiser> denoiser_;  // of the thread alone; kept, because its first use is slow
   std::string denoiser_made_for_;
   std::atomic<bool> stop_{false}, paused_{false};
   std::atomic<uint64_t> samples_done_{0};

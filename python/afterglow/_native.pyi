@@ -232,7 +232,9 @@ def method_descriptions() -> list[dict[str, Any]]:
 def denoisers(search: Sequence[str] = ()) -> list[dict[str, Any]]:
     """[{id, label, available: bool, reason, path, version}]"""
 def denoise(color: NDArray[np.float32], albedo: NDArray[np.float32] | None = None, normal: NDArray[np.float32] | None = None,
-            *, denoiser: str = "AUTO", search: Sequence[str] = ()) -> NDArray[np.float32]: ...
+            *, denoiser: str = "AUTO", search: Sequence[str] = (), prefilter: bool = False) -> NDArray[np.float32]:
+    """RGB of images (height, width, 3 or 4); values that are not finite count as their neighbours' mean. prefilter: albedo
+    and normal are filtered first, which pays where they are noisy. Unsupported where no denoiser is found."""
 def versions() -> dict[str, str]: ...   # embree, tbb, openimageio, pybind11, compiler
 def set_log(sink: Callable[[str, str], None] | None) -> None: ...
 

@@ -34,7 +34,7 @@ class FilmVisitor {
     float* combined = sums_ + layout_[Pass::kCombined];
     for (int c = 0; c < 3; ++c) combined[c] += light_[c];
     combined[3] += transparent_;
-    sums_[layout_[Pass::kBatches] + int(index_ % kBatchCount)] += luminance(light_);
+    sums_[layout_[Pass::kBatches] + int(batch_of(index_))] += luminance(light_);
   }
 
   /// Depth, position and indexes are those in the middle of the pixel, as in Cycles: a walk before the first sample, of

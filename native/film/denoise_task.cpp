@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The task's thread, and the tasks that nobody waits for any more.
+#include "film/denoise_task.h"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "base/errors.h"
+
+namespace afterglow {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Task {
+  std::shared_ptr<Denoiser> denoiser;
+  std::shared_ptr<DenoiseImages> images;
+  std::atomic<bool> stop{false};
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool done = false;
+  std::exception_ptr failure;
+
+  void run() {
+    std::exception_ptr caught;
+    try {
+      const DenoiseImages& i = *images;
+      denoiser->filter({.color = i.color.data(),
+                        .albedo = i.albedo.empty() ? nullptr : i.albedo.data(),
+                        .normal = i.normal.empty() ? nullptr : i.normal.data(),
+                        .width = i.width,
+                        .height = i.height,
+                        .fast = i.fast,
+                        .prefilter = i.prefilter,
+                        .stop = StopToken(&stop)},
+                       images->color.data());
+    } catch (...) {
+      caught = std::current_exception();
+    }
+    denoiser.reset();
+    const std::lock_guard lock(mutex);
+    failure = caught;
+    done = true;
+    changed.notify_all();
+  }
+};
+
+/// Threads of tasks; the process's end waits for those that are still in a library.
+struct Running {
+  std::atomic<int> count{0};
+  ~Running() {
+    for (int i = 0; i < 500 && count > 0; ++i) std::this_thread::sleep_for(10ms);
+  }
+};
+Running running;
+
+}  // namespace
+
+void run_denoise_task(std::shared_ptr<Denoiser>& denoiser, const std::shared_ptr<DenoiseImages>& images,
+                      StopToken stop) {
+  const auto task = std::make_shared<Task>();
+  task->denoiser = denoiser;
+  task->images = images;
+  running.count++;
+  try {
+    std::thread([task] {
+      task->run();
+      running.count--;
+    }).detach();
+  } catch (...) {
+    running.count--;
+    throw;
+  }
+  std::unique_lock lock(task->mutex);
+  while (!task->changed.wait_for(lock, 5ms, [&] { return task->done; })) {
+    if (!stop.stop()) continue;
+    task->stop = true;
+    denoiser.reset();
+    throw Cancelled("denoising was cancelled");
+  }
+  if (task->failure) std::rethrow_exception(task->failure);
+}
+
+}  // namespace afterglow
