@@ -37,7 +37,7 @@ class SceneRenderer:
         self.native = NativeScene()
         self.native.sync_with(depsgraph)
         self.native.scene.set_camera(**view.camera)
-        self.native.scene.commit()
+        self.native.scene.commit(flatten=True)  # as a final render does: the chart shows its times
         self.name = scene.name
         self.resolution = (max(8, view.width * percent // 100), max(8, view.height * percent // 100))
         self.key: dict[str, Any] = {"scene": scene.name}
