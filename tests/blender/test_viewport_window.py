@@ -4,6 +4,7 @@ hides, and that switching modes leaves nothing behind."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -291,3 +292,55 @@ def test_material_preview_renders(in_window: Run) -> None:
     )
     assert found["spread"] > 0.02 and found["level"] > 0.02
     assert "Traceback" not in found["output"], found["output"][-3000:]
+
+
+@pytest.mark.slow
+def test_clipping_of_the_view_and_of_the_camera(in_window: Run) -> None:
+    found = in_window(
+        """
+        s = scene(); s.afterglow.preview_accuracy, s.afterglow.preview_samples = 0.0, 4
+        def steps():
+            space = full_view(camera=False); yield 1.0
+            yield from settled()
+            whole = view_picture().copy()
+            space.clip_end = 7; yield 0.6
+            yield from settled()
+            result(view=np.abs(view_picture() - whole).mean(), clip=viewport().view.camera['clip'][1])
+            space.clip_end, s.camera.data.clip_end = 1000, 6
+            space.region_3d.view_perspective = 'CAMERA'; yield 0.6
+            yield from settled()
+            whole = view_picture().copy()
+            s.camera.data.clip_end = 100; yield 0.6
+            yield from settled()
+            result(camera=np.abs(view_picture() - whole).mean())
+        drive(steps)
+        """
+    )
+    assert found["clip"] == 7.0 and found["view"] > 1e-3 and found["camera"] > 1e-3, found
+
+
+@pytest.mark.slow
+def test_escape_cancels_a_final_render(in_window: Run) -> None:
+    if shutil.which("xdotool") is None:
+        pytest.skip("xdotool is not installed")
+    found = in_window(
+        """
+        import afterglow, os, subprocess, time
+        s = scene(640, 480, samples=1 << 20)
+        def steps():
+            yield 0.5
+            with in_view(): bpy.ops.render.render('INVOKE_DEFAULT')
+            yield 2.0
+            result(began=bpy.app.is_job_running('RENDER'))
+            subprocess.run(['xdotool', 'key', 'Escape'], check=True)
+            end = time.time() + 20
+            while bpy.app.is_job_running('RENDER') and time.time() < end: yield 0.05
+            while afterglow.statistics(s) is None and time.time() < end: yield 0.05
+            statistics = afterglow.statistics(s)
+            result(goes_on=bpy.app.is_job_running('RENDER'), cancelled=statistics['cancelled'],
+                   samples=statistics['samples'])
+            os._exit(0)  # after a cancelled render Blender's own code is 1
+        drive(steps)
+        """
+    )
+    assert found["began"] and not found["goes_on"] and found["cancelled"] and found["samples"] > 0, found
