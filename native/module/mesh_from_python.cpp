@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 
+#include "base/parallel.h"
 #include "module/arrays.h"
 
 namespace afterglow {
@@ -132,17 +134,23 @@ void take_faces(Mesh& mesh, const Columns& c, const std::string& owner) {
 Mesh mesh_of(const Columns& c, const std::string& name, const std::string& owner) {
   Mesh mesh;
   mesh.name = name;
-  mesh.positions = take<Vec3>(c.positions);
-  mesh.previous_positions = take<Vec3>(c.previous);
-  mesh.triangles = take<uint32_t>(c.triangles);
-  mesh.corners = take<uint32_t>(c.corners);
-  mesh.corner_normals = take<Vec3>(c.corner_normals);
-  mesh.vertex_normals = take<Vec3>(c.vertex_normals);
-  take_faces(mesh, c, owner);
-  for (const auto& [uv, column] : c.uvs) {
-    if (uv == c.active_uv) mesh.active_uv = uint32_t(mesh.uvs.size());
-    mesh.uvs.push_back({uv, take<Vec2>(column)});
+  mesh.uvs.resize(c.uvs.size());
+  // Each is a copy of its own: side by side where they are long.
+  std::vector<std::function<void()>> copies = {
+      [&] { mesh.positions = take<Vec3>(c.positions); },
+      [&] { mesh.previous_positions = take<Vec3>(c.previous); },
+      [&] { mesh.triangles = take<uint32_t>(c.triangles); },
+      [&] { mesh.corners = take<uint32_t>(c.corners); },
+      [&] { mesh.corner_normals = take<Vec3>(c.corner_normals); },
+      [&] { mesh.vertex_normals = take<Vec3>(c.vertex_normals); }};
+  for (size_t i = 0; i < c.uvs.size(); ++i) {
+    if (c.uvs[i].first == c.active_uv) mesh.active_uv = uint32_t(i);
+    copies.push_back([&, i] { mesh.uvs[i] = {c.uvs[i].first, take<Vec2>(c.uvs[i].second)}; });
   }
+  parallel_blocks(copies.size(), 1, c.triangles.rows < 20'000 ? 1 : 0, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) copies[i]();
+  });
+  take_faces(mesh, c, owner);
   for (const AttributeColumn& a : c.attributes) {
     if (a.name == c.active_color) mesh.active_color = uint32_t(mesh.attributes.size());
     mesh.attributes.push_back({a.name, a.domain, uint8_t(a.column.width), take<float>(a.column)});

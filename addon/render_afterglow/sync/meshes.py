@@ -45,6 +45,10 @@ def read_mesh(mesh: Any, attributes: Iterable[str] = ()) -> dict[str, Any] | Non
             found = tangents(result, name[len(TANGENTS):])
             if found is not None:
                 result["attributes"][name] = ("corner", found)
+    if "vertex_normals" in result and result["smooth"].all():
+        del result["smooth"]  # as it is where normals are given
+    if not ({"smooth", "materials"} & set(result) or any(domain == "face" for domain, _ in result["attributes"].values())):
+        del result["faces"]  # nobody asks which face a triangle is of
     return result
 
 
@@ -58,7 +62,8 @@ def _read_triangles(mesh: Any) -> dict[str, NDArray[Any]]:
         faces = read(mesh.loop_triangle_polygons, "value", np.int32, 1)[:, 0]
     else:
         faces = read(triangles, "polygon_index", np.int32, 1, offset=12)[:, 0]
-    result = {"triangles": vertices[corners], "corners": corners, "faces": faces}
+    # The mode spares a check of every index: they are Blender's own.
+    result = {"triangles": np.take(vertices, corners, mode="clip"), "corners": corners, "faces": faces}
     materials = _read_material_indices(mesh)
     if materials is not None and materials.any():
         result["materials"] = materials
