@@ -127,7 +127,7 @@ venvs:
 format:
 	@tools/setup.sh format
 	@git ls-files '*.cpp' '*.h' | xargs -r clang-format -i
-	@if command -v ruff >/dev/null; then ruff format . && ruff check --fix .; else echo "ruff is not installed: Python left as it is"; fi
+	@if command -v ruff >/dev/null; then ruff check --fix .; else echo "ruff is not installed: Python left as it is"; fi
 
 clean:
 	rm -rf build/release build/debug build/asan build/tsan build/trixie build/sid build/official build/demo build/scripts build/blender \

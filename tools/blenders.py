@@ -19,8 +19,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-import package  # noqa: E402
-import venvs  # noqa: E402
+import package
+import venvs
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOTS = Path(os.environ.get("AFTERGLOW_ROOTS") or ROOT / "build" / "roots")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from shipping import archives, dependencies, downloads, module, notices  # noqa: E402
+from shipping import archives, dependencies, downloads, module, notices
 
 ROOT = downloads.ROOT
 OUTPUT = ROOT / "build" / "package"

@@ -10,9 +10,8 @@ from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Vector
-
 from inside import image_format, load
+from mathutils import Vector
 
 SIZE = (48, 36)
 BLOCK = 6

@@ -11,7 +11,7 @@ import pytest
 
 
 @pytest.fixture(scope="module")
-def worker(library: Path, root: Path):  # noqa: ANN201
+def worker(library: Path, root: Path):
     os.environ["AFTERGLOW_ROOT"] = str(root)
     from afterglow import blenders
 
@@ -20,7 +20,7 @@ def worker(library: Path, root: Path):  # noqa: ANN201
         yield made
 
 
-def test_a_worker_renders_with_both_engines(worker, blend_files: Path) -> None:  # noqa: ANN001
+def test_a_worker_renders_with_both_engines(worker, blend_files: Path) -> None:
     from afterglow import images
 
     opened = worker.open(blend_files / "cornell_box.blend", 25)
@@ -35,7 +35,7 @@ def test_a_worker_renders_with_both_engines(worker, blend_files: Path) -> None: 
     assert pictures[0] == pytest.approx(pictures[1], rel=0.1)
 
 
-def test_a_failing_job_names_the_reason_and_the_worker_goes_on(worker, blend_files: Path) -> None:  # noqa: ANN001
+def test_a_failing_job_names_the_reason_and_the_worker_goes_on(worker, blend_files: Path) -> None:
     from afterglow import blenders
 
     with pytest.raises(blenders.WorkerError, match="no_such_setting"):

@@ -7,10 +7,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import afterglow._native as native
 import numpy as np
 from numpy.typing import NDArray
-
-import afterglow._native as native
 
 DIRECTIONS = {"normal": (0.0, 0.0, 1.0), "slanted": (0.5, 0.3, 0.81240384), "grazing": (-0.96, 0.1, 0.26153394)}
 

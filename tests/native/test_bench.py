@@ -126,7 +126,7 @@ def test_means_are_compared_beyond_three_standard_errors() -> None:
     assert compare({"combined": theirs["combined"]}, theirs)[0] == math.inf
 
 
-def test_the_cache_keeps_arrays_by_key(tmp_path, monkeypatch) -> None:  # noqa: ANN001
+def test_the_cache_keeps_arrays_by_key(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("AFTERGLOW_CACHE", str(tmp_path))
     made = []
 

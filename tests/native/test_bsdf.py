@@ -4,11 +4,10 @@ value over the density, no white material returns more than it got, and lossless
 
 from __future__ import annotations
 
+import afterglow._native as native
 import numpy as np
 import pytest
 from bsdf_tools import DIRECTIONS, albedo_by_sampling, chi_square, graph, sphere_integral
-
-import afterglow._native as native
 
 WHITE = (1.0, 1.0, 1.0)
 SMOOTH = {

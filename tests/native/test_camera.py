@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from test_scene import at, square
 
 WIDTH, HEIGHT = 64, 48

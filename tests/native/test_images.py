@@ -8,10 +8,9 @@ import zlib
 from pathlib import Path
 from typing import Any
 
+import afterglow._native as native
 import numpy as np
 import pytest
-
-import afterglow._native as native
 
 RED, GREEN, BLUE, WHITE = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0), (1.0, 1.0, 1.0, 1.0)
 FOUR = np.array([[RED, GREEN], [BLUE, WHITE]], np.float32)  # row 0 at the bottom

@@ -6,11 +6,10 @@ from __future__ import annotations
 import time
 from typing import Any
 
+import afterglow
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
-import afterglow
 
 Floats = NDArray[np.float64]
 

@@ -9,11 +9,10 @@ from collections.abc import Callable
 from math import atan, cos, pi, sin, sqrt
 from typing import Any
 
+import afterglow
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
-import afterglow
 
 Floats = NDArray[np.float64]
 UP = (0.0, 0.0, 1.0)

@@ -9,10 +9,9 @@ import math
 from pathlib import Path
 from typing import Any
 
+import afterglow._native as native
 import numpy as np
 import pytest
-
-import afterglow._native as native
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "nodes_of_blender.json").read_text())
 GRID = REFERENCE["grid"]

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from test_scene import SQUARE, TWO, at, down, square
 
 

@@ -76,7 +76,7 @@ def test_unknown_names_are_named() -> None:
         scenes.make("no such scene")
 
 
-def test_blend_files_are_small(blend_files) -> None:  # noqa: ANN001
+def test_blend_files_are_small(blend_files) -> None:
     for name in scenes.BLEND_FILES:
         path = blend_files / f"{name}.blend"
         assert path.is_file(), f"{path} is absent: write it by blend_files/make.py"

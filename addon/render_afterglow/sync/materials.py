@@ -9,9 +9,9 @@ from typing import Any
 
 import bpy
 
+from .attributes import NOBODY, Owner, property_of
 from .images import read_image, signature
 from .lights import uses_nodes
-from .attributes import NOBODY, Owner, property_of
 from .nodes import Context, Graph, compile_tree, names_of_attributes, solid_graph
 
 DEFAULT = 0  # the key of Blender's default surface: an empty slot
@@ -160,7 +160,7 @@ class MaterialTable:
         if uses_nodes(material):
             try:
                 graph = compile_tree(material.node_tree, "material", context)
-            except Exception as error:  # noqa: BLE001  a broken tree must not end the render
+            except Exception as error:  # a broken tree must not end the render
                 context.warn_once(f"its nodes cannot be read ({error}): shown grey")
                 graph = solid_graph("diffuse_bsdf", (0.8, 0.8, 0.8))
         else:

@@ -253,7 +253,7 @@ class ObjectTable:
         for walk in walks:
             try:
                 self._store_group(walk, meshes[walk.group.address].handle)
-            except Exception as error:  # noqa: BLE001  the render goes on without the object
+            except Exception as error:  # the render goes on without the object
                 self.warn(f"Object '{walk.group.properties['name']}': cannot be shown ({error}): left out")
         self.groups = groups
         kept = {entry.handle for entry in meshes.values()}
@@ -311,7 +311,7 @@ class ObjectTable:
                 arguments = read_mesh(mesh, names)
             if arguments is not None:
                 self._store_mesh(entry, known, arguments, use.name)
-        except Exception as error:  # noqa: BLE001  the render goes on without the object
+        except Exception as error:  # the render goes on without the object
             self.warn(f"Object '{use.name}': its mesh cannot be used ({error}): left out")
             entry.handle = None
         finally:
@@ -379,7 +379,7 @@ class ObjectTable:
             arguments = read_light(data, transform, self.materials.context(f"Light '{ob.name}'"), bits)
             arguments["name"] = ob.name
             self._store_light(key, arguments)
-        except Exception as error:  # noqa: BLE001  the render goes on without the light
+        except Exception as error:  # the render goes on without the light
             self.warn(f"Light '{ob.name}': cannot be used ({error}): left out")
             self.next_lights.discard(key)
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..images import to_display
-from .error import Array, LUMA, exposure, rgb
+from .error import LUMA, Array, exposure, rgb
 
 WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 WINDOW, SIGMA = 11, 1.5

@@ -10,7 +10,7 @@ import numpy as np
 
 from .description import Camera, Description, Light, Matrix, Object, look_at, node, rotate, scale, translate
 from .rooms import background, diffuse, emission
-from .shapes import box, bunny, cylinder, grid, join, lathe, quad, sphere, statue, transformed
+from .shapes import box, cylinder, grid, join, lathe, quad, sphere, statue, transformed
 
 
 def _fluted_pillar(height: float = 4.0, flutes: int = 20, rings: int = 24) -> Any:

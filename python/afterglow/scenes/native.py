@@ -52,7 +52,7 @@ class Built:
     """A description in a native scene: `scene`, and the handles of its objects, lights, meshes, materials and images."""
 
     def __init__(self, description: Description, frame: float | None = None) -> None:
-        from .. import CAMERA, ALL_RAYS, Scene
+        from .. import ALL_RAYS, CAMERA, Scene
 
         self.description = description
         self.scene = scene = Scene()
