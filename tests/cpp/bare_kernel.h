@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The path tracer of a diffuse scene under emissive meshes, written down by itself: what the kernel that a scene's Effects
-// choose is held against. No lens, world, lamp, clamp, holdout, transparency, local view, stop, pass or lobe but Lambert's is
-// known here. What every kernel asks of the scene, it asks of the same tables: the nearest hit and its facts, the material's
-// lobes, a light. Its picture is that of the chosen kernel to the last bit, so that both count the same work (Kajiya 1986;
-// Veach 1995 for the weights).
+// The path tracer of a diffuse scene under emissive meshes, written down by itself: what the kernel that a scene's
+// Effects choose is held against. No lens, world, lamp, clamp, holdout, transparency, local view, stop, pass or lobe
+// but Lambert's is known here. What every kernel asks of the scene, it asks of the same tables: the nearest hit and its
+// facts, the material's lobes, a light. What is no effect, it does as well: light that is not finite is dropped, shadow
+// rays end off their lights, batches tell the error. Its picture is that of the chosen kernel to the last bit, so that
+// both count the same work (Kajiya 1986; Veach 1995 for the weights).
 #pragma once
 
 #include <cstring>
 
-#include "methods/path_tracing/kernel.h"
+#include "methods/path_tracing/film_visitor.h"
 
 namespace afterglow::bare {
 
@@ -27,13 +28,21 @@ struct Path {
   PathContext context;
 };
 
+/// What is not finite is dropped and counted, here as everywhere.
+inline void add(Path& path, const Rgb& light, RayCounts& counts) {
+  if (std::fabs(light.x) + std::fabs(light.y) + std::fabs(light.z) <= path_tracing::kMostLight)
+    path.light += glm::max(light, Rgb(0.0f));
+  else
+    counts.dropped++;
+}
+
 /// Light run into, weighted against the chance that it had been looked for.
-inline void emitted(const Input& in, Path& path, const SurfacePoint& point, const Rgb& emission) {
+inline void emitted(const Input& in, Path& path, const SurfacePoint& point, const Rgb& emission, RayCounts& counts) {
   const float weight =
       path.density > 0.0f
           ? power_heuristic(path.density, in.scene.lights.density_of_triangle(path.position, path.normal, point))
           : 1.0f;
-  path.light += glm::max(path.throughput * (emission * weight), Rgb(0.0f));
+  add(path, path.throughput * (emission * weight), counts);
 }
 
 inline void look_for_light(const Input& in, Path& path, const SurfacePoint& point, const Rgb& albedo, float u_light,
@@ -44,15 +53,10 @@ inline void look_for_light(const Input& in, Path& path, const SurfacePoint& poin
   if (cosine <= 0.0f || glm::dot(point.face_normal, s.direction) <= 0.0f) return;
   const float density = cosine * kInvPi;
   const Rgb arriving = s.radiance * (power_heuristic(s.density, density) / s.density);
-  Ray ray;
-  ray.origin = offset_origin(point, s.direction);
-  const Vec3 way = s.direction * s.distance + s.margin - (ray.origin - point.position);
-  ray.t_max = glm::length(way);
-  ray.direction = way / ray.t_max;
-  ray.mask = kVisibleShadow;
+  const Ray ray = shadow_ray(point, s);
   counts.shadow++;
   if (in.scene.rays.occluded(ray)) return;
-  path.light += glm::max((path.throughput * arriving) * (albedo * density), Rgb(0.0f));
+  add(path, (path.throughput * arriving) * (albedo * density), counts);
 }
 
 /// Turns the path into a new direction; false: it ends.
@@ -80,7 +84,7 @@ inline void walk(const Input& in, Path& path, Sampler& sampler, RayCounts& count
     const SurfacePoint point = surface_point(in.scene.scene, path.ray, hit, false);
     Surface surface;
     in.scene.materials.shade(in.scene.scene, point, path.context, surface);
-    if (!is_black(surface.emission)) emitted(in, path, point, surface.emission);
+    if (!is_black(surface.emission)) emitted(in, path, point, surface.emission, counts);
     if (vertex > in.diffuse_bounces || !surface.count) return;
     sampler.set_dimension(kCameraDimensions + vertex * kVertexDimensions);
     const float u_light = sampler.next1(), u_end = sampler.next1();
@@ -106,14 +110,14 @@ inline void render(const Input& in, const PixelRequest& request, RayCounts& coun
       std::memset(sums, 0, sizeof(float) * size_t(layout.floats));
       const uint32_t pixel_seed = hash(x, y, in.seed);
       for (uint32_t i = request.first; i < request.first + request.count; ++i) {
-        Sampler sampler(hash(pixel_seed, i % kBatchCount), i / kBatchCount);
+        Sampler sampler(hash(pixel_seed, batch_of(i)), index_in_batch(i));
         const Vec2 in_pixel = in.film.filter().offset(sampler.next2());
         Path path;
         path.ray = in.camera.ray(Vec2(float(x) + 0.5f, float(y) + 0.5f) + in_pixel, Vec2(0.5f)).ray;
         path.ray.mask = kVisibleCamera;
         walk(in, path, sampler, counts);
         for (int c = 0; c < 3; ++c) sums[layout[Pass::kCombined] + c] += path.light[c];
-        sums[layout[Pass::kBatches] + int(i % kBatchCount)] += luminance(path.light);
+        sums[layout[Pass::kBatches] + int(batch_of(i))] += luminance(path.light);
       }
       in.film.add(x, y, sums, request.count);
     }

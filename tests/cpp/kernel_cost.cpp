@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A diffuse Cornell box by the kernel that its Effects choose (`kernel_cost chosen`), by one that holds nothing else
-// (`kernel_cost bare`, bare_kernel.h) or by the kernel with everything in it (`kernel_cost full`), to be run under callgrind,
-// whose counters run inside of measured() alone. Prints the picture's sum and how many rays it took.
+// (`kernel_cost bare`, bare_kernel.h) or by the kernel with everything in it (`kernel_cost full`), to be run under
+// callgrind, whose counters run inside of measured() alone. Prints the picture's sum and how many rays it took.
 #include <cstdio>
 #include <cstring>
 #include <functional>
@@ -41,9 +41,7 @@ void add_quads(Scene& scene, const char* name, Handle material, const std::vecto
 }
 
 std::vector<Corners> block(const Vec3& low, const Vec3& high) {
-  const auto at = [&](int x, int y, int z) {
-    return Vec3(x ? high.x : low.x, y ? high.y : low.y, z ? high.z : low.z);
-  };
+  const auto at = [&](int x, int y, int z) { return Vec3(x ? high.x : low.x, y ? high.y : low.y, z ? high.z : low.z); };
   return {{at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1)},
           {at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1)},
           {at(1, 1, 0), at(0, 1, 0), at(0, 1, 1), at(1, 1, 1)},
@@ -68,7 +66,8 @@ void build(Scene& scene) {
   add_quads(scene, "Tall", white, block({-0.65f, 0.0f, 0.0f}, {-0.05f, 0.6f, 1.2f}));
   add_quads(scene, "Low", white, block({0.05f, -0.65f, 0.0f}, {0.65f, -0.05f, 0.6f}));
   Camera camera;
-  camera.transform = DMat4(glm::dvec4(1, 0, 0, 0), glm::dvec4(0, 0, 1, 0), glm::dvec4(0, -1, 0, 0), glm::dvec4(0, -3.9, 1, 1));
+  camera.transform =
+      DMat4(glm::dvec4(1, 0, 0, 0), glm::dvec4(0, 0, 1, 0), glm::dvec4(0, -1, 0, 0), glm::dvec4(0, -3.9, 1, 1));
   camera.window = Vec4(-0.35f, 0.35f, -0.35f, 0.35f);
   scene.set_camera(camera);
 }
@@ -118,8 +117,8 @@ int main(int count, char** arguments) {
                                         .seed = kSeed,
                                         .stop = {}};
   const bool full = !std::strcmp(wanted, "full");
-  const uint32_t features = full ? kKernelCount - 1
-                                 : path_tracing::kernel_features(scene.effects, film.settings().passes, false);
+  const uint32_t features =
+      full ? kKernelCount - 1 : path_tracing::kernel_features(scene.effects, film.settings().passes, false);
   if (!full && features != 0) {
     std::printf("the effects of a diffuse box choose kernel %u\n", features);
     return 1;
