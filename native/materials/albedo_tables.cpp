@@ -97,6 +97,7 @@ struct Reflection {
   }
 };
 
+/// As Blender reckons it: every visible normal counts the same, those that reflect below the surface as nothing.
 struct Share {
   Cube cube;
   Share() {
@@ -105,16 +106,13 @@ struct Share {
       for (int r = 0; r < kCube; ++r) {
         const float alpha = alpha_at(r, kCube);
         for (int c = 0; c < kCube; ++c) {
-          float sum = 0.0f, all = 0.0f;
-          integrate(std::fmax(float(c) / (kCube - 1), 1e-3f), alpha, kCubePoints, [&](const Vec3& o, const Vec3& h) {
+          float sum = 0.0f;
+          integrate(std::fmax(float(c) / (kCube - 1), 1e-3f), alpha, kPlanePoints, [&](const Vec3& o, const Vec3& h) {
             const float oh = glm::dot(o, h);
             const Vec3 i = h * (2.0f * oh) - o;
-            if (i.z <= 0.0f) return;
-            const float w = weight(o, i, alpha);
-            all += w;
-            sum += w * saturate((fresnel_dielectric(oh, ior) - start) / (1.0f - start));
+            if (i.z > 0.0f) sum += saturate((fresnel_dielectric(oh, ior) - start) / (1.0f - start));
           });
-          cube.values.push_back(all > 0.0f ? sum / all : 0.0f);
+          cube.values.push_back(sum / kPlanePoints);
         }
       }
     }

@@ -9,7 +9,8 @@ namespace afterglow {
 float ggx_albedo(float cosine, float roughness);
 /// The same averaged over cosine-weighted directions.
 float ggx_mean_albedo(float roughness);
-/// Where between f0 and f90 the mean Fresnel reflection of a rough dielectric lies (0 … 1), weighted with its albedo.
+/// Where between f0 and f90 the mean Fresnel reflection of a rough dielectric lies (0 … 1), over its visible normals:
+/// what Blender shows as Glossy Color. Weighted with the shadowing of the way out it would be 4 % less to 2 % more.
 float schlick_share(float cosine, float roughness, float ior);
 /// Share of light that rough glass of this index returns, both sides together.
 float glass_albedo(float cosine, float roughness, float ior);

@@ -32,6 +32,14 @@ Rgb dielectric_fresnel(const Lobe& lobe, const Vec3& outgoing, const Rgb& f90) {
   return lerp(lobe.f0, f90, schlick_share(cosine, roughness, lobe.ior));
 }
 
+/// The Fresnel term of a dielectric layer averaged over cosine-weighted directions (fits of Kulla and Conty 2017).
+Rgb hemispheric_fresnel(const Lobe& lobe) {
+  const float n = lobe.ior, f0 = f0_from_ior(n);
+  const float mean =
+      n < 1.0f ? 0.997118f + n * (0.1014f - n * (0.965241f + n * 0.130607f)) : (n - 1.0f) / (4.08567f + 1.00071f * n);
+  return lerp(lobe.f0, lobe.f90, saturate((mean - f0) / (1.0f - f0)));
+}
+
 /// What a layer takes from those below, as Blender reckons it: compensation counts by its darkening alone.
 Rgb returned_by(const Lobe& lobe, const Vec3& outgoing) {
   return lobe.weight / lobe.energy * dielectric_fresnel(lobe, outgoing, lobe.f90);
@@ -152,7 +160,7 @@ void add_principled(const Operands& in, const HitContext& hit, Surface& surface)
     lobe.f0 = f0 * tint;
     lobe.weight = weight;
     if (eta != 1.0f) {
-      if (multi) compensate(lobe, o, dielectric_fresnel(lobe, o, lobe.f90));
+      if (multi) compensate(lobe, o, hemispheric_fresnel(lobe));
       const Rgb returned = returned_by(lobe, o);
       lobe.sampling_weight = mean(returned * lobe.energy);
       push_lobe(surface, lobe);

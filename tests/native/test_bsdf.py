@@ -157,3 +157,22 @@ def test_extremes_stay_finite(kind: str, roughness: float) -> None:
         assert np.isfinite(weight).all() and (weight >= 0).all() and (s["density"][ok] > 0).all()
         np.testing.assert_allclose(np.linalg.norm(s["direction"][ok], axis=1), 1.0, atol=1e-4)
         assert ((s["direction"][ok][:, 2] < 0) == s["transmitted"][ok]).all()
+
+
+# Glossy Color of a black Principled of index 1.5, read from Cycles 5.0.1: by roughness, cosines 3/15, 6/15 … 1
+GLOSSY_COLOR = {
+    0.4: (0.18897797, 0.1057993, 0.061876837, 0.043923046, 0.039063577),
+    0.8: (0.06746452, 0.04494339, 0.033167277, 0.027026208, 0.023987072),
+    1.0: (0.044960145, 0.02872878, 0.020829631, 0.016453454, 0.013786418),
+}
+
+
+@pytest.mark.parametrize("roughness", GLOSSY_COLOR)
+def test_the_color_of_a_rough_dielectric_is_that_of_cycles(roughness: float) -> None:
+    black = graph("principled", base_color=(0.0, 0.0, 0.0), roughness=roughness, ior=1.5)
+    cosine = np.arange(3, 16, 3) / 15.0
+    incoming = np.stack([np.sqrt(1 - cosine**2), np.zeros(5), cosine], -1).astype(np.float32)
+    up = np.array([[0, 0, 1]], np.float32)
+    shown = native.evaluate_graph(black, {"position": np.zeros((5, 3), np.float32), "normal": up, "face_normal": up,
+                                          "incoming": incoming, "uv": np.zeros((1, 2), np.float32)})
+    np.testing.assert_allclose(shown["glossy"][:, 0], GLOSSY_COLOR[roughness], rtol=0.01)
