@@ -39,13 +39,20 @@ struct MethodTraits {
   uint32_t terms = kIndirectDiffuse;
   bool layers = false;  // wants the layered filter
   bool needs_next_frame = false;
+  uint32_t interleave = 1;   // n: neighbouring pixels ask n × n different parts of the lights; answers want the
+                             // discontinuity buffer
+  bool fills_holes = false;  // prepare() wants only the points that gather() could not answer
 };
 
 struct CachePoint {  // a diffuse lobe that asks for light
   Vec3 position, normal, face_normal, outgoing;
   float footprint = 0.0f, segment = 0.0f;  // of a pixel on the surface; length of the ray that came here
-  uint32_t instance = kNone, triangle = kNone, pixel = 0;
-  uint8_t layer = 0;
+  uint32_t instance = kNone, triangle = kNone;
+  float u = 0.0f, v = 0.0f;  // barycentric weights of the triangle's second and third corner
+  float error = 0.0f;        // as SurfacePoint's
+  uint16_t x = 0, y = 0;     // pixel of the full image, divided by the step of its pass
+  uint32_t sample = 0;
+  uint8_t layer = 0;         // surfaces seen before on this path
   bool translucent = false;  // the lobe gathers from behind
 };
 struct Answer {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Methods that serve every light term take requests as they are.
+// Methods that serve every light term take requests as they are; for the others the camera's paths are walked here.
 #include "render/renderer.h"
 
 namespace afterglow {
@@ -7,13 +7,51 @@ namespace afterglow {
 Renderer::Renderer(const std::string& method)
     : id_(method == "AUTO" ? "PATH_TRACING" : method), method_(make_method(id_)) {}
 
+std::unique_ptr<Renderer> Renderer::take(const CommittedScene& scene, const std::string& method) {
+  auto renderer = std::make_unique<Renderer>(method);
+  auto kept = scene.kept.take<Renderer>(renderer->id_);
+  return kept ? std::move(kept) : std::move(renderer);
+}
+
+void Renderer::leave(const CommittedScene& scene, std::unique_ptr<Renderer> renderer) {
+  if (renderer->method_->traits().terms == kAllTerms) return;
+  const std::string name = renderer->id_;
+  scene.kept.leave(name, std::move(renderer));
+}
+
+void Renderer::configure(const Settings& settings) {
+  settings_ = WalkSettings{};
+  settings_.configure(settings);
+  method_->configure(settings);
+  times_ = WavefrontTimes{};
+}
+
 void Renderer::update(const CommittedScene& scene, Work& work) {
   method_->update(scene, scene.scene.changes_since(version_), work);
   version_ = scene.scene.version();
 }
 
 void Renderer::render(const CommittedScene& scene, std::span<const PixelRequest> requests, Film& film, Work& work) {
-  method_->render(scene, requests, film, work);
+  if (method_->traits().terms == kAllTerms) return method_->render(scene, requests, film, work);
+  render_wavefronts(*method_, scene, requests, film, work, settings_, times_);
+}
+
+MethodStatistics Renderer::statistics() const {
+  MethodStatistics s = method_->statistics();
+  if (method_->traits().terms == kAllTerms) return s;
+  const auto add = [&](const char* name, double value) { s.values.emplace_back(name, value); };
+  add("camera_rays", double(times_.counts.camera));
+  add("bounce_rays", double(times_.counts.bounce));
+  add("shadow_rays", double(times_.counts.shadow));
+  add("dropped", double(times_.counts.dropped + times_.dropped));
+  add("questions", double(times_.points));
+  add("holes", double(times_.holes));
+  add("seconds_walk", times_.walk);
+  add("seconds_gather", times_.gather);
+  add("seconds_prepare", times_.prepare);
+  add("seconds_filter", times_.filter);
+  add("seconds_film", times_.film);
+  return s;
 }
 
 }  // namespace afterglow

@@ -7,6 +7,7 @@
 
 #include "film/film.h"
 #include "methods/method.h"
+#include "render/wavefront.h"
 #include "transport/committed_scene.h"
 
 namespace afterglow {
@@ -15,18 +16,24 @@ class Renderer {
  public:
   /// AUTO: what suits the scene. Throws InvalidInput for an unknown method.
   explicit Renderer(const std::string& method);
+  /// The one that a render of the scene by this method left behind, with its caches, or a new one.
+  static std::unique_ptr<Renderer> take(const CommittedScene&, const std::string& method);
+  /// Keeps it for the next render, if its method remembers anything.
+  static void leave(const CommittedScene&, std::unique_ptr<Renderer>);
   const std::string& method() const { return id_; }
-  void configure(const Settings& settings) { method_->configure(settings); }
+  void configure(const Settings&);
 
   /// Brings the method up to date with the scene. Not while render() runs.
   void update(const CommittedScene&, Work&);
   void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&);
-  MethodStatistics statistics() const { return method_->statistics(); }
+  MethodStatistics statistics() const;
 
  private:
   std::string id_;
   std::unique_ptr<IndirectMethod> method_;
   uint64_t version_ = 0;
+  WalkSettings settings_;
+  WavefrontTimes times_;
 };
 
 }  // namespace afterglow

@@ -242,8 +242,11 @@ void Session::run(RenderSettings settings) {
   std::string text;
   try {
     const std::shared_lock use(scene_->use);
-    Renderer renderer(settings.method);
-    renderer.configure(settings.method_settings);
+    std::unique_ptr<Renderer> kept = Renderer::take(*scene_, settings.method);
+    Renderer& renderer = *kept;
+    Settings method_settings = settings.method_settings;
+    method_settings.emplace_back("accuracy", double(settings.accuracy));
+    renderer.configure(method_settings);
     if (settings.denoise) settings.film.passes |= kDenoisePasses;
     std::shared_ptr<Film> film;
     {
@@ -267,6 +270,7 @@ void Session::run(RenderSettings settings) {
     }
     run_limited(settings.threads, [&] { render_passes(settings, renderer, *film); });
     if (stop_) result = SessionState::kCancelled;
+    Renderer::leave(*scene_, std::move(kept));
   } catch (const std::bad_alloc&) {
     failure = std::make_exception_ptr(OutOfMemory("the render ran out of memory; lower the resolution or the passes"));
     text = "the render ran out of memory";

@@ -10,6 +10,7 @@
 #include "scene/changes.h"
 #include "scene/effects.h"
 #include "scene/scene.h"
+#include "transport/keepsakes.h"
 
 namespace afterglow {
 
@@ -24,6 +25,7 @@ struct CommittedScene {
   /// Who renders holds it shared for as long as its threads read; who edits or commits holds it alone. The module's
   /// edits do not wait for it: they tell the user to edit inside `with session.edit()`.
   mutable std::shared_mutex use;
+  mutable Keepsakes kept;  // by renders, for the next one
 
   /// Changes since the last commit, warnings of every layer included.
   SceneChanges commit(RayCaster::Options options);

@@ -44,6 +44,24 @@ struct PathState {
   bool last = false;         // limits reached: only light that is run into still counts
 };
 
+/// Moves the diffuse lobes to a surface of their own; sampling weights of what stays sum to 1 again.
+inline void split_diffuse(Surface& surface, Surface& diffuse) {
+  int rest = 0;
+  float sum = 0.0f;
+  for (int i = 0; i < surface.count; ++i) {
+    if (surface.lobes[i].kind < LobeKind::kMicrofacetReflection) {
+      diffuse.lobes[diffuse.count++] = surface.lobes[i];
+    } else {
+      sum += surface.lobes[i].sampling_weight;
+      if (rest != i) surface.lobes[rest] = surface.lobes[i];
+      rest++;
+    }
+  }
+  surface.count = rest;
+  const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
+  for (int i = 0; i < rest; ++i) surface.lobes[i].sampling_weight *= scale;
+}
+
 /// Which rays an object shows itself to, by the kind of the ray that arrives.
 inline uint32_t visibility_of(uint32_t kind) {
   uint32_t mask = 0;

@@ -10,6 +10,10 @@
 //   throughput not applied void escaped(const PathState&, const Rgb& light)                      the same of the world,
 //   and of nothing at all void held_out(const PathState&, float share)                          a holdout seen from the
 //   camera
+// A visitor that names a type SplitsDiffuse is also told
+//   void diffuse(const PathState&, const SurfacePoint&, const Surface& diffuse_lobes)
+// and answers for the light that other surfaces send there: the walk goes on through the other lobes alone, and the
+// light sources that it looks for are not weighed against diffuse directions that are never taken.
 #pragma once
 
 #include "base/cancel.h"
@@ -50,6 +54,11 @@ inline Ray shadow_ray(const SurfacePoint& from, const LightSample& light) {
   return ray;
 }
 
+template <class Visitor>
+inline constexpr bool kSplits = requires {
+  typename Visitor::SplitsDiffuse;
+};
+
 template <uint32_t kFeatures>
 class Walker {
   static constexpr bool kLobes = kFeatures & kFeatureLobes;
@@ -89,9 +98,19 @@ class Walker {
       const float u_light = sampler.next1(), u_end = sampler.next1();
       const Vec2 u_emitter = sampler.next2();
       if (!visitor.surface(path, point, surface)) return;
-      const float straight = kStraight ? straight_probability(surface) : 0.0f;
-      if (surface.count && straight < 1.0f)
-        look_for_light(path, point, surface, 1.0f - straight, u_light, u_emitter, visitor);
+      float straight;
+      if constexpr (kSplits<Visitor>) {
+        Surface diffuse;
+        split_diffuse(surface, diffuse);
+        straight = kStraight ? straight_probability(surface) : 0.0f;
+        if (diffuse.count) visitor.diffuse(path, point, diffuse);
+        if (diffuse.count || surface.count)
+          look_for_light(path, point, surface, &diffuse, 1.0f - straight, u_light, u_emitter, visitor);
+      } else {
+        straight = kStraight ? straight_probability(surface) : 0.0f;
+        if (surface.count && straight < 1.0f)
+          look_for_light(path, point, surface, nullptr, 1.0f - straight, u_light, u_emitter, visitor);
+      }
       const float u_lobe = sampler.next1(), u_straight = sampler.next1();
       const Vec2 u = sampler.next2();
       if constexpr (kStraight) {
@@ -210,12 +229,22 @@ class Walker {
   }
 
   template <class Visitor>
-  void look_for_light(const PathState& path, const SurfacePoint& point, const Surface& surface, float scatter_share,
-                      float u_light, const Vec2& u, Visitor& visitor) const {
+  void look_for_light(const PathState& path, const SurfacePoint& point, const Surface& surface,
+                      [[maybe_unused]] const Surface* diffuse, float scatter_share, float u_light, const Vec2& u,
+                      Visitor& visitor) const {
     LightSample light;
     if (!scene_.lights.sample(point.position, light_normal(point, surface), u_light, u, light)) return;
     if (!(light.density > 0.0f) || is_black(light.radiance)) return;
     BsdfValue value = evaluate<!kLobes>(surface, point.face_normal, point.outgoing, light.direction);
+    float weight = 1.0f;
+    if constexpr (kSplits<Visitor>) {  // nothing but this sample looks for the diffuse lobes' light
+      if (!light.delta) weight = power_heuristic(light.density, value.density * scatter_share);
+      const BsdfValue whole = evaluate<!kLobes>(*diffuse, point.face_normal, point.outgoing, light.direction);
+      value.diffuse = value.diffuse * weight + whole.diffuse;
+      value.glossy = value.glossy * weight + whole.glossy;
+      value.transmission = value.transmission * weight + whole.transmission;
+      weight = 1.0f;
+    }
     if constexpr (kShapes || kStraight) {
       if ((light.visibility & kVisibleAll) != kVisibleAll) {
         if (!(light.visibility & kVisibleDiffuse)) value.diffuse = Rgb(0.0f);
@@ -224,7 +253,8 @@ class Walker {
       }
     }
     if (is_black(value.total())) return;
-    const float weight = light.delta ? 1.0f : power_heuristic(light.density, value.density * scatter_share);
+    if constexpr (!kSplits<Visitor>)
+      weight = light.delta ? 1.0f : power_heuristic(light.density, value.density * scatter_share);
     Rgb arriving = light.radiance * (weight / light.density);
     if (light.cast_shadow) {
       const Ray ray = shadow_ray(point, light);

@@ -345,3 +345,19 @@ def test_depth_of_field_keeps_what_is_in_focus_sharp() -> None:
         return int(((row > 0.02) & (row < 0.98)).sum())
 
     assert edge_width(4.0) <= 3 < edge_width(2.0)
+
+
+def test_light_near_a_large_surface_is_not_hidden_by_itself() -> None:
+    """A lamp 0.01 above a square of 6 × 6 lights the floor beside it: shadow rays start above the floor, and must end on
+    the lamp, not inside of it."""
+    gap, half, beside = 0.01, 0.2, 0.23
+    scene = one_quad(diffuse((0.5, 0.5, 0.5)))
+    scene.camera = Camera(translate((beside, 0, 1)), angle=0.004)
+    scene.materials["lamp"] = emission(3.0)
+    scene.add("Lamp", quad(*[(x * half, y * half, gap) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]), "lamp")
+    grid = (np.arange(2000) + 0.5) / 1000 - 1
+    d2 = (grid[:, None] * half - beside) ** 2 + (grid[None, :] * half) ** 2 + gap**2
+    irradiance = 3.0 * (gap**2 / d2**2).mean() * (2 * half) ** 2
+    value, error = mean(scene, samples=256, size=8, max_bounces=0)
+    assert abs(value - 0.5 * irradiance / math.pi) < 4 * error + 1e-2 * value
+    assert error < 0.02 * value

@@ -13,7 +13,7 @@ import bpy
 from .. import backend
 
 # Numbers that files hold already; a method that is not here gets one from its name, which is as lasting.
-METHOD_NUMBERS = {"AUTO": 0, "PATH_TRACING": 1}
+METHOD_NUMBERS = {"AUTO": 0, "PATH_TRACING": 1, "INSTANT_RADIOSITY": 2, "INSTANT_CACHE": 3}
 
 _groups: dict[str, type] = {}
 
@@ -54,7 +54,7 @@ def make_property(setting: dict[str, Any]) -> Any:
         return bpy.props.EnumProperty(items=numbered, default=setting["default"], **common)
     for bound in ("min", "max"):
         if setting.get(bound) is not None:
-            common[bound] = setting[bound]
+            common[bound] = int(setting[bound]) if kind == "int" else setting[bound]
     if kind == "int":
         return bpy.props.IntProperty(default=int(setting["default"]), **common)
     if kind in ("str", "string"):

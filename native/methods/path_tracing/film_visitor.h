@@ -129,7 +129,7 @@ class FilmVisitor {
     transparent_ += share * (path.throughput.x + path.throughput.y + path.throughput.z) / 3.0f;
   }
 
- private:
+ protected:
   /// Clamped, within bounds and not negative; what is dropped is counted.
   Rgb kept(const Rgb& light, bool direct) {
     const float sum = std::fabs(light.x) + std::fabs(light.y) + std::fabs(light.z);

@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "methods/path_tracing/kernel.h"
+#include "methods/walk_settings.h"
 
 namespace afterglow::path_tracing {
 
@@ -18,35 +19,11 @@ constexpr std::array<Kernel, sizeof...(kIndices)> kernel_table(std::index_sequen
   return {render_request<uint32_t(kIndices)>...};
 }
 
-int64_t integer(const SettingValue& value) {
-  if (const auto* i = std::get_if<int64_t>(&value)) return *i;
-  if (const auto* d = std::get_if<double>(&value)) return int64_t(*d);
-  return std::get<bool>(value);
-}
-double number(const SettingValue& value) {
-  if (const auto* d = std::get_if<double>(&value)) return *d;
-  return double(integer(value));
-}
-
 class PathTracing final : public IndirectMethod {
  public:
   MethodTraits traits() const override { return {.terms = kAllTerms}; }
 
-  void configure(const Settings& settings) override {
-    for (const auto& [name, value] : settings) {
-      const auto limit = [&] { return uint32_t(std::max<int64_t>(0, integer(value))); };
-      const auto clamp = [&] { return number(value) > 0.0 ? 3.0f * float(number(value)) : kInfinity; };
-      if (name == "max_bounces") limits_.max_bounces = limit();
-      if (name == "diffuse_bounces") limits_.diffuse = limit();
-      if (name == "glossy_bounces") limits_.glossy = limit();
-      if (name == "transmission_bounces") limits_.transmission = limit();
-      if (name == "transparent_max_bounces") limits_.transparent = limit();
-      if (name == "caustics_reflective") limits_.caustics_reflective = integer(value) != 0;
-      if (name == "caustics_refractive") limits_.caustics_refractive = integer(value) != 0;
-      if (name == "sample_clamp_direct") clamp_direct_ = clamp();
-      if (name == "sample_clamp_indirect") clamp_indirect_ = clamp();
-    }
-  }
+  void configure(const Settings& settings) override { settings_.configure(settings); }
 
   void update(const CommittedScene&, const SceneChanges&, Work&) override {}
   bool refine(const CommittedScene&, Work&) override { return false; }
@@ -58,11 +35,11 @@ class PathTracing final : public IndirectMethod {
   void render(const CommittedScene& scene, std::span<const PixelRequest> requests, Film& film, Work& work) override {
     const CameraRays camera(scene.scene.camera(), scene.scene.origin(), film.settings().width, film.settings().height);
     const bool with_uv = film.layout()[Pass::kUv] >= 0;
-    const KernelInput input{.walk = {scene, limits_, work.shown, with_uv},
+    const KernelInput input{.walk = {scene, settings_.limits, work.shown, with_uv},
                             .camera = camera,
                             .film = film,
-                            .clamp_direct = clamp_direct_,
-                            .clamp_indirect = clamp_indirect_,
+                            .clamp_direct = settings_.clamp_direct,
+                            .clamp_indirect = settings_.clamp_indirect,
                             .seed = hash(uint32_t(work.seed), uint32_t(work.seed >> 32)),
                             .stop = work.stop};
     const Kernel kernel = choose_kernel(kernel_features(scene.effects, film.settings().passes, work.shown));
@@ -91,8 +68,7 @@ class PathTracing final : public IndirectMethod {
   }
 
  private:
-  WalkLimits limits_;
-  float clamp_direct_ = kInfinity, clamp_indirect_ = kInfinity;
+  WalkSettings settings_;
   RayCounts counts_;
 };
 

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Filling the cache and answering from it: see cache.h; the temporal update is in cache_update.cpp.
+#include "methods/instant_cache/cache.h"
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <chrono>
+
+#include "base/parallel.h"
+
+namespace afterglow::instant_cache {
+
+namespace {
+
+constexpr size_t kRecordBlock = 4;  // 1024 rays or so
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+/// Which points go first: a coarse grid of pixels, then finer ones, so that records stand apart.
+uint32_t round_of(const CachePoint& p) {
+  const uint32_t both = uint32_t(p.x) | uint32_t(p.y);
+  return both % 16 == 0 ? 0 : both % 8 == 0 ? 1 : both % 4 == 0 ? 2 : both % 2 == 0 ? 3 : 4;
+}
+constexpr uint32_t kRounds = 5;
+
+}  // namespace
+
+Answer Cache::answer(const CachePoint& p) const {
+  Answer result;
+  const float limit = spacing_.most_pixels * p.footprint;
+  float weights = 0.0f;
+  Rgb sum(0.0f);
+  bool waits = false;
+  octree_.find(p.position, [&](const Entry& e) {
+    const float distance = distance_to_record(e, p, limit, spacing_.angle_scale);
+    if (distance >= 1.0f) return true;
+    const Record& record = records_[e.record];
+    if (!record.ready) {
+      std::atomic_ref(wanted_[e.record]).store(1, std::memory_order_relaxed);
+      waits = true;
+      return true;
+    }
+    std::atomic_ref(used_[e.record]).store(update_, std::memory_order_relaxed);
+    const float weight = record_weight(distance);
+    weights += weight;
+    sum += weight * record.irradiance;
+    return true;
+  });
+  if (!(weights > 0.0f) || waits) return result;
+  result.light = sum / weights;
+  result.weight = 1.0f;
+  return result;
+}
+
+bool Cache::covered(const CachePoint& p) const {
+  const float limit = spacing_.most_pixels * p.footprint;
+  bool found = false;
+  octree_.find(p.position, [&](const Entry& e) {
+    found = distance_to_record(e, p, limit, spacing_.angle_scale) < 1.0f;
+    return !found;
+  });
+  return found;
+}
+
+bool Cache::insert(const CommittedScene& scene, const CachePoint& p) {
+  if (records_.size() >= settings_.most_records) return false;
+  Record record;
+  record.place = place_of(scene.scene, p);
+  if (!locate(scene.scene, record)) return false;
+  record.footprint = p.footprint;
+  record.reach = record.radius = std::max(spacing_.most_pixels * p.footprint, 1e-6f * radius_);
+  record.used = update_;
+  octree_.insert(uint32_t(records_.size()), record);
+  records_.push_back(record);
+  used_.push_back(update_);
+  wanted_.push_back(0);
+  visibility_.add_row();
+  counts_.created++;
+  return true;
+}
+
+void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points, Work& work) {
+  const double begun = now();
+  if (settings_.on_demand) {
+    std::vector<uint32_t> wanted;
+    for (uint32_t i = 0; i < records_.size(); ++i)
+      if (wanted_[i]) wanted.push_back(i), wanted_[i] = 0;
+    counts_.updated += wanted.size();
+    counts_.update_rays += resolve(scene, wanted, work);
+  }
+  std::vector<std::vector<uint32_t>> rounds(kRounds);
+  for (uint32_t i = 0; i < points.size(); ++i) rounds[round_of(points[i])].push_back(i);
+  // A record's radius is known when its light is, and may turn out smaller than it was taken for while records were
+  // chosen: points that new records seemed to cover are asked again. Each repeat brings at least one record.
+  std::vector<uint8_t> open;
+  for (std::vector<uint32_t>& asked : rounds)
+    while (!work.stop.stop()) {
+      open.assign(asked.size(), 0);
+      parallel_blocks(asked.size(), 256, work.threads, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) open[i] = !covered(points[asked[i]]);
+      });
+      size_t left = 0;
+      for (size_t i = 0; i < asked.size(); ++i)
+        if (open[i]) asked[left++] = asked[i];
+      asked.resize(left);
+      const uint32_t first = uint32_t(records_.size());
+      for (const uint32_t i : asked)
+        if (!covered(points[i]) && !insert(scene, points[i])) counts_.refused++;
+      if (records_.size() == first) break;
+      std::vector<uint32_t> fresh(records_.size() - first);
+      for (uint32_t i = 0; i < fresh.size(); ++i) fresh[i] = first + i;
+      counts_.fill_rays += resolve(scene, fresh, work);
+    }
+  counts_.seconds_fill += now() - begun;
+}
+
+uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> which, Work& work) {
+  std::atomic<uint64_t> rays{0};
+  const WalkScene walked = walk(scene);
+  parallel_blocks(
+      which.size(), kRecordBlock, work.threads,
+      [&](size_t begin, size_t end) {
+        RayCounts counts;
+        std::vector<float> terms(lights_.padded());
+        for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
+          ask(walked, which[i], terms.data(), counts);
+          sum(which[i], terms.data());
+        }
+        rays += counts.shadow;
+      },
+      work.stop);
+  for (const uint32_t i : which)
+    if (records_[i].ready) octree_.set_radius(i, records_[i]);
+  return rays;
+}
+
+void Cache::ask(const WalkScene& walked, size_t index, float* terms, RayCounts& counts) {
+  const Record& record = records_[index];
+  geometry_terms(lights_, record.position, record.normal, bound_, terms);
+  const Vec3 from = record.position + record.error * record.face_normal;
+  uint64_t* unknown = visibility_.unknown(index);
+  for (uint32_t w = 0; w < visibility_.words(); ++w) {
+    for (uint64_t bits = unknown[w]; bits; bits &= bits - 1) {
+      const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
+      const VirtualLight& light = lights_.lights[k];
+      const float g = terms[k];
+      const bool shines = g > 0.0f ? front_[w] >> (k % 64) & 1 : g < 0.0f && (back_[w] >> (k % 64) & 1);
+      const bool asks = shines && can_see(record.position, record.face_normal, light, g > 0.0f);
+      visibility_.set(index, k, asks ? visibility(walked, visibility_ray(from, light), counts) : Rgb(0.0f));
+    }
+    unknown[w] = 0;
+  }
+}
+
+Rgb Cache::irradiance(size_t row, const Vec3& position, const Vec3& normal, float* terms) const {
+  geometry_terms(lights_, position, normal, bound_, terms);
+  const uint64_t* seen = visibility_.seen(row);
+  Rgb sum(0.0f);
+  for (uint32_t w = 0; w < visibility_.words(); ++w)
+    for (uint64_t bits = seen[w]; bits; bits &= bits - 1) {
+      const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
+      const float g = terms[k];
+      if (g == 0.0f) continue;
+      const Rgb light = std::fabs(g) * (g > 0.0f ? lights_.lights[k].front : lights_.lights[k].back);
+      sum += visibility_.coloured() ? light * visibility_.get(row, k) : light;
+    }
+  return is_finite(sum) ? sum : Rgb(0.0f);
+}
+
+void Cache::sum(size_t index, float* terms) {
+  Record& record = records_[index];
+  record.irradiance = irradiance(index, record.position, record.normal, terms);
+  // How fast the light changes along the surface, shadows left aside: by two steps of a pixel or so.
+  const float step = 0.25f * record.reach, here = luminance(record.irradiance);
+  const Frame frame(record.normal);
+  float slope2 = 0.0f;
+  for (const Vec3& way : {frame.t, frame.b}) {
+    const float there = luminance(irradiance(index, record.position + step * way, record.normal, terms));
+    const float slope = (there - here) / (step * std::max(0.5f * (there + here), 1e-30f));
+    slope2 += slope * slope;
+  }
+  record.radius = std::min(record_radius(spacing_, std::sqrt(slope2), record.footprint), record.reach);
+  record.ready = true;
+}
+
+Verification Cache::verify(const CommittedScene& scene, Work& work) const {
+  Verification result;
+  std::mutex mutex;
+  const WalkScene walked = walk(scene);
+  parallel_blocks(records_.size(), kRecordBlock, work.threads, [&](size_t begin, size_t end) {
+    std::vector<float> terms(lights_.padded());
+    RayCounts counts;
+    for (size_t i = begin; i < end; ++i) {
+      const Record& stored = records_[i];
+      if (!stored.ready) continue;
+      Record fresh = stored;
+      if (!locate(scene.scene, fresh)) continue;
+      geometry_terms(lights_, fresh.position, fresh.normal, bound_, terms.data());
+      const Vec3 from = fresh.position + fresh.error * fresh.face_normal;
+      Rgb sum(0.0f);
+      for (uint32_t k = 0; k < lights_.count; ++k) {
+        const float g = terms[k];
+        const Rgb& light = g > 0.0f ? lights_.lights[k].front : lights_.lights[k].back;
+        if (g == 0.0f || is_black(light) || !can_see(fresh.position, fresh.face_normal, lights_.lights[k], g > 0.0f))
+          continue;
+        Rgb seen = visibility(walked, visibility_ray(from, lights_.lights[k]), counts);
+        if (visibility_.coloured()) seen = unpack_transmittance(pack_transmittance(seen));
+        sum += std::fabs(g) * light * seen;
+      }
+      const Rgb off = glm::abs(sum - stored.irradiance);
+      const double relative = double(max_component(off)) / std::max(double(max_component(sum)), 1e-30);
+      const std::lock_guard lock(mutex);
+      result.records++;
+      result.differing += relative > 1e-5;
+      result.worst = std::max(result.worst, relative);
+    }
+  });
+  return result;
+}
+
+size_t Cache::record_bytes() const { return sizeof(Record) + 5 + visibility_.row_bytes(); }
+
+size_t Cache::bytes() const {
+  return records_.capacity() * sizeof(Record) + visibility_.bytes() + octree_.bytes() + 5 * records_.capacity();
+}
+
+}  // namespace afterglow::instant_cache

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The records, their visibility and the lights that they saw, kept in step with a scene. Every edit first marks what it
+// makes unknown (no ray is traced), then what is unknown is asked: at once, or when a point wants the record. Whatever
+// interrupts this, what is unknown stays marked.
+#pragma once
+
+#include <mutex>
+#include <span>
+
+#include "methods/instant_cache/interpolation.h"
+#include "methods/instant_cache/moved.h"
+#include "methods/virtual_light_settings.h"
+#include "methods/walk_settings.h"
+
+namespace afterglow::instant_cache {
+
+struct CacheSettings {
+  WalkSettings walk;
+  VirtualLightSettings lights;
+  float accuracy = 0.05f;
+  uint32_t keep_updates = 64;  // a record that answered nothing for so many updates is dropped; 0: never
+  uint32_t most_records = 1u << 20;
+  bool on_demand = false;
+};
+
+struct CacheCounts {
+  uint64_t path_rays = 0, fill_rays = 0, update_rays = 0, pairs_marked = 0, pairs = 0;
+  uint64_t created = 0, updated = 0, reused = 0, moved = 0, dropped = 0, resets = 0, refused = 0;
+  uint32_t lights = 0, lights_moved = 0, lights_recoloured = 0, objects_moved = 0;
+  double seconds_lights = 0.0, seconds_update = 0.0, seconds_fill = 0.0;
+};
+
+/// How far the records are from fresh ones at the same places.
+struct Verification {
+  double worst = 0.0;  // relative difference of irradiance
+  uint64_t records = 0, differing = 0;
+};
+
+class Cache {
+ public:
+  void configure(const CacheSettings&);
+  void update(const CommittedScene&, const SceneChanges&, Work&);
+  void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
+  Answer answer(const CachePoint&) const;
+  Verification verify(const CommittedScene&, Work&) const;
+  const CacheCounts& counts() const { return counts_; }
+  size_t size() const { return records_.size(); }
+  size_t bytes() const;
+  size_t record_bytes() const;
+
+ private:
+  void reset(const CommittedScene&);
+  void trace_lights(const CommittedScene&, Work&, std::vector<uint64_t>& moved_slots, bool& recoloured);
+  void follow(const CommittedScene&, const std::vector<Moved>&);
+  void mark_crossings(const std::vector<Moved>&, Work&);
+  void mark(size_t record, const std::vector<uint64_t>& slots);
+  void age();
+  void keep(const std::vector<uint32_t>& kept);
+  void rebuild_octree();
+  bool covered(const CachePoint&) const;
+  bool insert(const CommittedScene&, const CachePoint&);
+  /// Asks what is unknown of these records and sums their light anew.
+  uint64_t resolve(const CommittedScene&, std::span<const uint32_t> records, Work&);
+  void ask(const WalkScene&, size_t record, float* terms, RayCounts&);
+  void sum(size_t record, float* terms);
+  Rgb irradiance(size_t row, const Vec3& position, const Vec3& normal, float* terms) const;
+  WalkScene walk(const CommittedScene& scene) const {
+    return {scene, settings_.walk.limits, shown_.empty() ? nullptr : &shown_, false};
+  }
+
+  CacheSettings settings_;
+  bool stale_ = true;  // nothing that is kept may be used
+  Spacing spacing_;
+  LightEmission emission_;
+  VirtualLightColumns lights_;
+  std::vector<uint64_t> front_, back_;  // bits: lights that shine on that side
+  Placement placement_;
+  InstanceMask shown_;
+  float bound_ = 0.0f;
+  Vec3 center_{0.0f};
+  float radius_ = 0.0f;
+
+  std::vector<Record> records_;
+  VisibilityTable visibility_;
+  Octree octree_;
+  mutable std::vector<uint32_t> used_;   // the update after which a record last answered
+  mutable std::vector<uint8_t> wanted_;  // asked for while something of it was unknown
+  uint32_t update_ = 0;
+  CacheCounts counts_;
+};
+
+}  // namespace afterglow::instant_cache

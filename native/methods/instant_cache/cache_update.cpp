@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The temporal update (Debattista et al. 2009, algorithm 1): all five cases, marked before any ray is traced.
+//   1, 2  a light moved, came or went because its path did: its ray from every record is unknown.
+//   3     a light that was seen and whose way now crosses an object's new bounds.
+//   4     a light that was not seen (or not fully) and whose way crossed an object's old bounds.
+//   5     a record on a moved object: it rides along and all of its rays are unknown; without its triangle it is
+//   dropped.
+// A change of colour or strength alone marks nothing: sums are made anew from the visibility that is known.
+#include <algorithm>
+#include <bit>
+#include <chrono>
+
+#include "base/parallel.h"
+#include "methods/instant_cache/cache.h"
+
+namespace afterglow::instant_cache {
+
+namespace {
+
+constexpr size_t kManyObjects = 512;  // beyond, everything is asked again
+constexpr uint32_t kGroup = 16;       // records that are tested together
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+void set_bit(std::vector<uint64_t>& bits, uint32_t k) { bits[k / 64] |= uint64_t(1) << (k % 64); }
+
+uint64_t spread_bits(uint64_t x) {  // every third bit
+  x &= 0x1fffff;
+  x = (x | x << 32) & 0x1f00000000ffffull;
+  x = (x | x << 16) & 0x1f0000ff0000ffull;
+  x = (x | x << 8) & 0x100f00f00f00f00full;
+  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
+  return (x | x << 2) & 0x1249249249249249ull;
+}
+
+bool same_walk(const WalkLimits& a, const WalkLimits& b) {
+  return a.max_bounces == b.max_bounces && a.diffuse == b.diffuse && a.transparent == b.transparent &&
+         a.caustics_reflective == b.caustics_reflective && a.caustics_refractive == b.caustics_refractive;
+}
+
+}  // namespace
+
+void Cache::configure(const CacheSettings& settings) {
+  const CacheSettings& o = settings_;
+  stale_ |= !same_walk(settings.walk.limits, o.walk.limits) || settings.lights.count != o.lights.count ||
+            settings.lights.pattern != o.lights.pattern || settings.lights.bound != o.lights.bound ||
+            settings.accuracy != o.accuracy;
+  settings_ = settings;
+  spacing_ = spacing_of(settings.accuracy);
+}
+
+void Cache::reset(const CommittedScene& scene) {
+  records_.clear(), used_.clear(), wanted_.clear();
+  visibility_.reset(
+      plan_slots(settings_.lights.count, settings_.lights.options(settings_.walk.limits, 0).bounces).slots,
+      scene.effects.has(kTransparency) || !shown_.empty());
+  octree_.clear(center_, radius_);
+  lights_.fill({});
+  placement_.clear();
+  counts_.resets++;
+  stale_ = false;
+}
+
+void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Work& work) {
+  const double begun = now();
+  const InstanceMask shown = work.shown ? *work.shown : InstanceMask{};
+  Vec3 center;
+  float radius;
+  LightEmission::surrounding_ball(scene.scene.bounds(), center, radius);
+  const float bound = settings_.lights.bound_length(scene.scene.bounds());
+  const bool coloured = scene.effects.has(kTransparency) || !shown.empty();
+  stale_ |= changes.everything || changes.origin || shown != shown_ || center != center_ || radius != radius_ ||
+            bound != bound_ || coloured != visibility_.coloured();
+  shown_ = shown, center_ = center, radius_ = radius, bound_ = bound;
+  update_++;
+  const bool all = stale_;
+  if (all) reset(scene);
+  SceneChanges seen = changes;
+  seen.camera = false;
+  counts_.updated = counts_.reused = counts_.moved = counts_.created = 0;
+  if (!all && seen.empty()) {
+    counts_.reused = records_.size();
+    std::vector<uint32_t> waiting;  // an earlier update was interrupted
+    for (uint32_t i = 0; i < records_.size(); ++i)
+      if (!records_[i].ready) waiting.push_back(i);
+    if (!settings_.on_demand) counts_.update_rays += resolve(scene, waiting, work);
+    return;
+  }
+  age();
+  std::vector<uint64_t> moved_slots;
+  bool recoloured = false;
+  trace_lights(scene, work, moved_slots, recoloured);
+  const std::vector<Moved> moved = placement_.update(scene, changes);
+  counts_.objects_moved = uint32_t(moved.size());
+  follow(scene, moved);
+  if (std::any_of(moved_slots.begin(), moved_slots.end(), [](uint64_t w) { return w != 0; }))
+    for (size_t i = 0; i < records_.size(); ++i) mark(i, moved_slots);
+  mark_crossings(moved, work);
+
+  std::vector<uint32_t> waiting, dimmed;
+  for (uint32_t i = 0; i < records_.size(); ++i) {
+    const uint64_t* unknown = visibility_.unknown(i);
+    uint64_t any = 0;
+    for (uint32_t w = 0; w < visibility_.words(); ++w)
+      any |= unknown[w], counts_.pairs_marked += uint64_t(std::popcount(unknown[w]));
+    counts_.pairs += lights_.count;
+    if (any) {
+      records_[i].ready = false;
+      waiting.push_back(i);
+    } else if (recoloured) {
+      dimmed.push_back(i);
+    } else {
+      counts_.reused++;
+    }
+  }
+  resolve(scene, dimmed, work);  // sums alone
+  if (settings_.on_demand)
+    std::fill(wanted_.begin(), wanted_.end(), uint8_t(0));
+  else
+    counts_.update_rays += resolve(scene, waiting, work), counts_.updated += waiting.size();
+  counts_.seconds_update += now() - begun;
+}
+
+/// Cases 1 and 2: slots whose light is not where it was, or shines where it was black.
+void Cache::trace_lights(const CommittedScene& scene, Work& work, std::vector<uint64_t>& moved_slots,
+                         bool& recoloured) {
+  const double begun = now();
+  RayCounts rays;
+  emission_.build(scene.scene, scene.materials);
+  std::vector<VirtualLight> lights =
+      trace_virtual_lights(walk(scene), emission_, settings_.lights.options(settings_.walk.limits, work.threads), rays);
+  const uint32_t slots = uint32_t(lights.size());
+  moved_slots.assign(visibility_.words(), 0);
+  counts_.lights_moved = counts_.lights_recoloured = counts_.lights = 0;
+  const bool first = lights_.count != slots;
+  for (uint32_t k = 0; k < slots; ++k) {
+    const VirtualLight none, &before = first ? none : lights_.lights[k], &now = lights[k];
+    counts_.lights += !now.black();
+    const bool moved = first || !before.same_place(now);
+    const bool lit = (is_black(before.front) && !is_black(now.front)) || (is_black(before.back) && !is_black(now.back));
+    if (moved || lit) set_bit(moved_slots, k), counts_.lights_moved++;
+    if (!before.same_strength(now)) recoloured = true, counts_.lights_recoloured += !moved;
+  }
+  lights_.fill(std::move(lights));
+  front_.assign(visibility_.words(), 0), back_.assign(visibility_.words(), 0);
+  for (uint32_t k = 0; k < slots; ++k) {
+    if (!lights_.lights[k].alive) continue;
+    if (!is_black(lights_.lights[k].front)) set_bit(front_, k);
+    if (!is_black(lights_.lights[k].back)) set_bit(back_, k);
+  }
+  counts_.path_rays += rays.bounce;
+  counts_.seconds_lights += now() - begun;
+}
+
+/// Case 5: records follow the triangle that they stand on; those that lost it are dropped.
+void Cache::follow(const CommittedScene& scene, const std::vector<Moved>& moved) {
+  std::vector<const Moved*> by_instance(std::max<size_t>(scene.scene.instances().size(), 1), nullptr);
+  bool any = false;
+  std::vector<uint32_t> gone;
+  for (const Moved& m : moved) {
+    if (m.in_place) continue;
+    any = true;
+    if (m.instance >= by_instance.size()) by_instance.resize(m.instance + 1, nullptr);
+    by_instance[m.instance] = &m;
+  }
+  if (!any) return;
+  std::vector<uint32_t> kept;
+  bool changed = false;
+  for (uint32_t i = 0; i < records_.size(); ++i) {
+    Record& record = records_[i];
+    const Moved* m = record.place.instance < by_instance.size() ? by_instance[record.place.instance] : nullptr;
+    if (!m) {
+      kept.push_back(i);
+      continue;
+    }
+    changed = true;
+    if (!m->keeps_places || !m->after.present() || !locate(scene.scene, record)) {
+      counts_.dropped++;
+      continue;
+    }
+    counts_.moved++;
+    uint64_t* unknown = visibility_.unknown(i);
+    std::fill_n(unknown, visibility_.words(), ~uint64_t(0));
+    if (lights_.count % 64) unknown[visibility_.words() - 1] = (uint64_t(1) << (lights_.count % 64)) - 1;
+    kept.push_back(i);
+  }
+  if (kept.size() != records_.size()) keep(kept);
+  if (changed) rebuild_octree();
+}
+
+void Cache::mark(size_t record, const std::vector<uint64_t>& slots) {
+  uint64_t* unknown = visibility_.unknown(record);
+  for (uint32_t w = 0; w < visibility_.words(); ++w) unknown[w] |= slots[w];
+}
+
+/// Cases 3 and 4. Groups of records near each other are tested against each object first, then each record against the
+/// object's own box, then what is known tells whether a ray has to be traced.
+void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
+  if (moved.empty() || records_.empty() || !lights_.count) return;
+  if (moved.size() > kManyObjects) {
+    const std::vector<uint64_t> all(visibility_.words(), ~uint64_t(0));
+    std::vector<uint64_t> every = all;
+    if (lights_.count % 64) every.back() = (uint64_t(1) << (lights_.count % 64)) - 1;
+    for (size_t i = 0; i < records_.size(); ++i) mark(i, every);
+    return;
+  }
+  std::vector<std::pair<uint64_t, uint32_t>> order(records_.size());
+  const float scale = float(1 << 20) / std::max(2.0f * radius_, 1e-30f);
+  for (uint32_t i = 0; i < records_.size(); ++i) {
+    const Vec3 at = glm::clamp((records_[i].position - center_ + radius_) * scale, Vec3(0.0f), Vec3(1048575.0f));
+    order[i] = {spread_bits(uint64_t(at.x)) | spread_bits(uint64_t(at.y)) << 1 | spread_bits(uint64_t(at.z)) << 2, i};
+  }
+  std::sort(order.begin(), order.end());
+  const float *x = lights_.x.data(), *y = lights_.y.data(), *z = lights_.z.data();
+  const uint32_t words = visibility_.words(), count = lights_.count;
+  // Rays begin and end a little above the faces: all boxes are taken as much larger.
+  float lift = 0.0f;
+  for (const VirtualLight& light : lights_.lights) lift = std::max(lift, light.lift);
+  parallel_blocks(order.size(), kGroup, work.threads, [&](size_t begin, size_t end) {
+    Box around;
+    float error = 0.0f;
+    for (size_t i = begin; i < end; ++i) {
+      const Record& record = records_[order[i].second];
+      around.extend(record.position);
+      error = std::max(error, record.error);
+    }
+    const float slack = 2.0f * (lift + error);
+    const auto larger = [&](const Box& box) { return Box{box.lower - slack, box.upper + slack}; };
+    std::vector<uint64_t> before(words), after(words), crosses(words);
+    for (const Moved& m : moved) {
+      const bool was = m.before.present(), is = m.after.present();
+      std::fill(before.begin(), before.end(), 0), std::fill(after.begin(), after.end(), 0);
+      if (was) crossing_from_box(larger(m.before.world), around, x, y, z, count, before.data());
+      if (is) crossing_from_box(larger(m.after.world), around, x, y, z, count, after.data());
+      const auto any = [](const std::vector<uint64_t>& bits) {
+        return std::any_of(bits.begin(), bits.end(), [](uint64_t w) { return w != 0; });
+      };
+      const bool any_before = any(before), any_after = any(after);
+      if (!any_before && !any_after) continue;
+      for (size_t i = begin; i < end; ++i) {
+        const uint32_t index = order[i].second;
+        uint64_t* unknown = visibility_.unknown(index);
+        const Vec3& from = records_[index].position;
+        for (const bool old : {false, true}) {
+          if (old ? !any_before : !any_after) continue;
+          crossing(old ? m.before : m.after, from, slack, x, y, z, count, crosses.data());
+          for (uint32_t w = 0; w < words; ++w)
+            for (uint64_t bits = crosses[w] & (old ? before[w] : after[w]) & (front_[w] | back_[w]) & ~unknown[w]; bits;
+                 bits &= bits - 1) {
+              const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
+              if (old ? visibility_.could_brighten(index, k) : visibility_.could_darken(index, k))
+                unknown[w] |= uint64_t(1) << (k % 64);
+            }
+        }
+      }
+    }
+  });
+}
+
+void Cache::age() {
+  if (!settings_.keep_updates) return;
+  std::vector<uint32_t> kept;
+  for (uint32_t i = 0; i < records_.size(); ++i)
+    if (update_ - used_[i] <= settings_.keep_updates) kept.push_back(i);
+  if (kept.size() == records_.size()) return;
+  counts_.dropped += records_.size() - kept.size();
+  keep(kept);
+  rebuild_octree();
+}
+
+void Cache::keep(const std::vector<uint32_t>& kept) {
+  for (size_t to = 0; to < kept.size(); ++to) {
+    records_[to] = records_[kept[to]];
+    used_[to] = used_[kept[to]], wanted_[to] = wanted_[kept[to]];
+  }
+  records_.resize(kept.size()), used_.resize(kept.size()), wanted_.resize(kept.size());
+  visibility_.keep(kept);
+}
+
+void Cache::rebuild_octree() {
+  octree_.clear(center_, radius_);
+  for (uint32_t i = 0; i < records_.size(); ++i) octree_.insert(i, records_[i]);
+}
+
+}  // namespace afterglow::instant_cache

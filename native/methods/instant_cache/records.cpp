@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Places and packed visibility: see records.h.
+#include "methods/instant_cache/records.h"
+
+#include <algorithm>
+
+#include "rays/surface_point.h"
+
+namespace afterglow::instant_cache {
+
+namespace {
+
+/// The triangle seen along a direction.
+SurfacePoint seen_along(const Scene& scene, const Place& place, const Vec3& direction) {
+  Hit hit;
+  hit.t = 0.0f, hit.u = place.u, hit.v = place.v;
+  hit.instance = place.instance, hit.triangle = place.triangle;
+  const Ray ray{Vec3(0.0f), 0.0f, direction, kInfinity, kVisibleAll};
+  return surface_point(scene, ray, hit, false);
+}
+
+/// Normal of the winding, or of wherever the triangle without area was looked at from.
+Vec3 winding_normal(const Scene& scene, const Place& place) {
+  const SurfacePoint point = seen_along(scene, place, Vec3(0, 0, 1));
+  return point.backfacing ? -point.face_normal : point.face_normal;
+}
+
+}  // namespace
+
+bool locate(const Scene& scene, Record& record) {
+  const Vec3 normal = winding_normal(scene, record.place) * (record.place.back ? -1.0f : 1.0f);
+  const SurfacePoint point = seen_along(scene, record.place, -normal);
+  record.position = point.position;
+  record.normal = point.normal, record.face_normal = point.face_normal;
+  record.error = point.error;
+  return is_finite(point.position) && is_finite(point.normal) && is_finite(point.face_normal);
+}
+
+Place place_of(const Scene& scene, const CachePoint& point) {
+  Place place{point.instance, point.triangle, point.u, point.v, false};
+  place.back = glm::dot(winding_normal(scene, place), point.face_normal) < 0.0f;
+  return place;
+}
+
+uint16_t pack_transmittance(const Rgb& t) {
+  const auto part = [](float x, float steps) { return uint16_t(std::clamp(x, 0.0f, 1.0f) * steps + 0.5f); };
+  return uint16_t(part(t.x, 31.0f) << 11 | part(t.y, 63.0f) << 5 | part(t.z, 31.0f));
+}
+
+Rgb unpack_transmittance(uint16_t packed) {
+  return {float(packed >> 11) / 31.0f, float(packed >> 5 & 63) / 63.0f, float(packed & 31) / 31.0f};
+}
+
+void VisibilityTable::reset(uint32_t slots, bool coloured) {
+  slots_ = slots, words_ = (slots + 63) / 64, coloured_ = coloured;
+  rows_ = 0;
+  seen_.clear(), unknown_.clear(), transmittance_.clear();
+}
+
+void VisibilityTable::add_row() {
+  rows_++;
+  seen_.resize(rows_ * words_, 0);
+  unknown_.resize(rows_ * words_, ~uint64_t(0));
+  if (slots_ % 64 && words_) unknown_.back() = (uint64_t(1) << (slots_ % 64)) - 1;
+  if (coloured_) transmittance_.resize(rows_ * slots_, 0);
+}
+
+void VisibilityTable::keep(const std::vector<uint32_t>& kept) {
+  for (size_t to = 0; to < kept.size(); ++to) {
+    const size_t from = kept[to];
+    if (from == to) continue;
+    std::copy_n(seen(from), words_, seen(to));
+    std::copy_n(unknown(from), words_, unknown(to));
+    if (coloured_) std::copy_n(transmittance_.data() + from * slots_, slots_, transmittance_.data() + to * slots_);
+  }
+  rows_ = kept.size();
+  seen_.resize(rows_ * words_), unknown_.resize(rows_ * words_);
+  if (coloured_) transmittance_.resize(rows_ * slots_);
+}
+
+Rgb VisibilityTable::get(size_t row, uint32_t slot) const {
+  if (!(seen(row)[slot / 64] >> (slot % 64) & 1)) return Rgb(0.0f);
+  return coloured_ ? unpack_transmittance(transmittance_[row * slots_ + slot]) : Rgb(1.0f);
+}
+
+void VisibilityTable::set(size_t row, uint32_t slot, const Rgb& visibility) {
+  const uint64_t bit = uint64_t(1) << (slot % 64);
+  const uint16_t packed = pack_transmittance(visibility);
+  uint64_t& word = seen(row)[slot / 64];
+  word = packed ? word | bit : word & ~bit;
+  if (coloured_) transmittance_[row * slots_ + slot] = packed;
+}
+
+bool VisibilityTable::could_brighten(size_t row, uint32_t slot) const {
+  if (!could_darken(row, slot)) return true;
+  return coloured_ && transmittance_[row * slots_ + slot] != 0xffff;
+}
+
+size_t VisibilityTable::bytes() const {
+  return 8 * (seen_.capacity() + unknown_.capacity()) + 2 * transmittance_.capacity();
+}
+
+}  // namespace afterglow::instant_cache

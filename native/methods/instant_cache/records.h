@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Records of the instant cache (Debattista et al. 2009, section 3.2): where light was gathered, how much, and for each
+// virtual light whether it was seen. The paper keeps each light's contribution in four bytes; kept here is visibility
+// alone, one bit a light where everything is opaque and 16 bits of coloured transmittance elsewhere. Contributions are
+// recomputed from it, so that sums never drift: a record with 256 lights takes about 300 or 800 bytes.
+#pragma once
+
+#include <vector>
+
+#include "methods/method.h"
+#include "scene/scene.h"
+
+namespace afterglow::instant_cache {
+
+/// A place on a triangle: it follows the triangle wherever its object goes.
+struct Place {
+  uint32_t instance = kNone, triangle = kNone;
+  float u = 0.0f, v = 0.0f;  // barycentric weights of the second and third corner
+  bool back = false;         // on the side that the triangle's winding turns away
+};
+
+struct Record {
+  Place place;
+  Vec3 position{0.0f}, normal{0, 0, 1}, face_normal{0, 0, 1};
+  float error = 0.0f;      // how far above the face rays start
+  float footprint = 0.0f;  // of the pixel that asked for it
+  float reach = 0.0f;      // radius under which it stands in the octree
+  float radius = 0.0f;     // within which it may be used, at most reach
+  Rgb irradiance{0.0f};
+  uint32_t used = 0;   // the update after which it last answered
+  bool ready = false;  // no visibility is unknown
+};
+
+/// Where the place is now. False: the triangle has no area.
+bool locate(const Scene&, Record&);
+Place place_of(const Scene&, const CachePoint&);
+
+/// Transmittance to three small numbers; 0 and 1 are kept exactly.
+uint16_t pack_transmittance(const Rgb&);
+Rgb unpack_transmittance(uint16_t);
+
+/// Visibility of every virtual light from every record, and which of them have to be asked (again).
+class VisibilityTable {
+ public:
+  void reset(uint32_t slots, bool coloured);
+  uint32_t words() const { return words_; }  // of 64 bits, a row
+  bool coloured() const { return coloured_; }
+  size_t rows() const { return rows_; }
+  void add_row();                                // everything unknown
+  void keep(const std::vector<uint32_t>& kept);  // drops all rows but these, in this order
+  uint64_t* unknown(size_t row) { return unknown_.data() + row * words_; }
+  const uint64_t* unknown(size_t row) const { return unknown_.data() + row * words_; }
+  /// Lights of which anything arrives.
+  uint64_t* seen(size_t row) { return seen_.data() + row * words_; }
+  const uint64_t* seen(size_t row) const { return seen_.data() + row * words_; }
+  Rgb get(size_t row, uint32_t slot) const;
+  void set(size_t row, uint32_t slot, const Rgb&);
+  /// Whether an object that comes into the way could change it, and one that leaves it.
+  bool could_darken(size_t row, uint32_t slot) const { return seen(row)[slot / 64] >> (slot % 64) & 1; }
+  bool could_brighten(size_t row, uint32_t slot) const;
+  size_t bytes() const;
+  size_t row_bytes() const { return words_ * 16 + (coloured_ ? slots_ * 2 : 0); }
+
+ private:
+  uint32_t slots_ = 0, words_ = 0;
+  bool coloured_ = false;
+  size_t rows_ = 0;
+  std::vector<uint64_t> seen_, unknown_;
+  std::vector<uint16_t> transmittance_;  // only where coloured
+};
+
+}  // namespace afterglow::instant_cache

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Gathering from virtual point lights, interleaved 3 × 3 (Keller and Heidrich 2001): see instant_radiosity.h.
+// Equations: Debattista et al. 2009, (1) with radiant intensities normalised by light paths, (2), (3).
+#include "methods/instant_radiosity/instant_radiosity.h"
+
+#include <array>
+#include <chrono>
+#include <mutex>
+
+#include "methods/virtual_light_settings.h"
+#include "methods/walk_settings.h"
+
+namespace afterglow::instant_radiosity {
+
+namespace {
+
+constexpr uint32_t kInterleave = 3, kParts = kInterleave * kInterleave;
+
+class InstantRadiosity final : public IndirectMethod {
+ public:
+  MethodTraits traits() const override { return {.interleave = lights_settings_.interleave ? kInterleave : 1}; }
+
+  void configure(const Settings& settings) override {
+    settings_.configure(settings);
+    lights_settings_.configure(settings);
+    stale_ = true;
+  }
+
+  void update(const CommittedScene& scene, const SceneChanges& changes, Work& work) override {
+    shown_.clear();
+    if (work.shown) shown_ = *work.shown;
+    const SceneChanges& c = changes;
+    SceneChanges seen = c;
+    seen.camera = false;
+    if (!stale_ && seen.empty()) return;
+    stale_ = false;
+    const auto begun = std::chrono::steady_clock::now();
+    emission_.build(scene.scene, scene.materials);
+    std::vector<VirtualLight> lights = trace_virtual_lights(
+        walk(scene), emission_, lights_settings_.options(settings_.limits, work.threads), path_rays_);
+    bound_ = lights_settings_.bound_length(scene.scene.bounds());
+    alive_ = 0;
+    std::array<std::vector<VirtualLight>, kParts> parts;
+    uint32_t next = 0;
+    for (const VirtualLight& light : lights) {
+      if (light.black()) continue;
+      alive_++;
+      parts[next++ % kParts].push_back(light);
+    }
+    for (uint32_t i = 0; i < kParts; ++i) parts_[i].fill(std::move(parts[i]));
+    whole_.fill(std::move(lights));
+    seconds_lights_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  }
+
+  bool refine(const CommittedScene&, Work&) override { return false; }
+  void prepare(const CommittedScene&, std::span<const CachePoint>, Work&) override {}
+
+  void gather(const CommittedScene& scene, std::span<const CachePoint> points,
+              std::span<Answer> answers) const override {
+    RayCounts counts;
+    std::vector<float> terms(whole_.padded());
+    const WalkScene walked = walk(scene);
+    for (size_t i = 0; i < points.size(); ++i) {
+      const CachePoint& p = points[i];
+      const bool shares = lights_settings_.interleave && p.layer == 0 && !p.translucent;
+      const uint32_t part = (p.x % kInterleave + kInterleave * (p.y % kInterleave) + p.sample) % kParts;
+      const Rgb e = shares ? float(kParts) * irradiance(walked, parts_[part], p, terms, counts)
+                           : irradiance(walked, whole_, p, terms, counts);
+      answers[i] = {e, 1.0f, 0.0f};
+    }
+    const std::lock_guard lock(mutex_);
+    gather_rays_ += counts;
+  }
+
+  void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&) override {}
+
+  MethodStatistics statistics() const override {
+    return {{{"virtual_lights", double(alive_)},
+             {"path_rays", double(path_rays_.bounce)},
+             {"visibility_rays", double(gather_rays_.shadow)},
+             {"seconds_lights", seconds_lights_}}};
+  }
+
+ private:
+  WalkScene walk(const CommittedScene& scene) const {
+    return {scene, settings_.limits, shown_.empty() ? nullptr : &shown_, false};
+  }
+
+  Rgb irradiance(const WalkScene& walked, const VirtualLightColumns& lights, const CachePoint& p,
+                 std::vector<float>& terms, RayCounts& counts) const {
+    geometry_terms(lights, p.position, p.normal, bound_, terms.data());
+    const Vec3 lifted = p.position + p.error * p.face_normal;
+    Rgb sum(0.0f);
+    for (uint32_t k = 0; k < lights.count; ++k) {
+      const float g = terms[k];
+      if (g == 0.0f) continue;
+      const VirtualLight& light = lights.lights[k];
+      const Rgb& intensity = g > 0.0f ? light.front : light.back;
+      if (is_black(intensity) || !can_see(p.position, p.face_normal, light, g > 0.0f)) continue;
+      sum += std::fabs(g) * intensity * visibility(walked, visibility_ray(lifted, light), counts);
+    }
+    return sum;
+  }
+
+  WalkSettings settings_;
+  VirtualLightSettings lights_settings_;
+  LightEmission emission_;
+  InstanceMask shown_;
+  std::array<VirtualLightColumns, kParts> parts_;
+  VirtualLightColumns whole_;
+  float bound_ = 0.0f;
+  bool stale_ = true;
+  uint32_t alive_ = 0;
+  RayCounts path_rays_;
+  double seconds_lights_ = 0.0;
+  mutable std::mutex mutex_;
+  mutable RayCounts gather_rays_;
+};
+
+}  // namespace
+
+MethodDescription describe() {
+  MethodDescription d;
+  d.id = "INSTANT_RADIOSITY";
+  d.label = "Instant Radiosity";
+  d.description = "Virtual point lights asked by every pixel anew: no noise, but nothing is remembered";
+  VirtualLightSettings::describe(d.settings);
+  d.settings.push_back({"interleave", "Interleave",
+                        "Neighbouring pixels ask different parts of the lights and share what they find", "", true, 0.0,
+                        1.0});
+  d.statistics = {"virtual_lights", "path_rays", "visibility_rays", "seconds_lights"};
+  return d;
+}
+
+std::unique_ptr<IndirectMethod> make() { return std::make_unique<InstantRadiosity>(); }
+
+}  // namespace afterglow::instant_radiosity

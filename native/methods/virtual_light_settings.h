@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Settings of the methods that shine with virtual point lights, and what lengths they mean in a scene.
+#pragma once
+
+#include "methods/method.h"
+#include "transport/virtual_lights.h"
+
+namespace afterglow {
+
+struct VirtualLightSettings {
+  uint32_t count = 256, pattern = 0;
+  float bound = 2.0f;
+  bool interleave = true;
+
+  void configure(const Settings&);
+  static void describe(std::vector<SettingDescription>&);
+  VirtualLightOptions options(const WalkLimits&, uint32_t threads) const;
+  /// The bounding distance of (2): `bound` times the scene's radius over the square root of the number of lights, so
+  /// that more lights lose less light.
+  float bound_length(const Box& bounds) const;
+};
+
+}  // namespace afterglow

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Wavefronts, stage after stage: see wavefront.h.
+#include "render/wavefront.h"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "base/parallel.h"
+#include "film/discontinuity.h"
+#include "render/wavefront_kernel.h"
+
+namespace afterglow {
+
+namespace {
+
+constexpr uint64_t kMostSamples = 1u << 18;  // of one wavefront: about 50 MB of questions
+constexpr size_t kGatherBlock = 512;
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& total) : total_(total), begun_(now()) {}
+  ~Stopwatch() { total_ += now() - begun_; }
+
+ private:
+  double& total_;
+  double begun_;
+};
+
+/// All questions of a wavefront in the order of its requests.
+struct Wavefront {
+  std::vector<WalkedRequest> requests;
+  std::vector<CachePoint> points;
+  std::vector<Answer> answers;
+  std::vector<size_t> first;  // of each request's points
+};
+
+void walk(const path_tracing::KernelInput& input, WalkKernel kernel, std::span<const PixelRequest> requests,
+          Wavefront& wave, Work& work, WavefrontTimes& times) {
+  const Stopwatch watch(times.walk);
+  wave.requests.resize(requests.size());
+  parallel_blocks(
+      requests.size(), 1, work.threads,
+      [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
+          while (work.pause && work.pause->load() && !work.stop.stop())
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+          kernel(input, requests[i], wave.requests[i]);
+        }
+      },
+      work.stop);
+  for (const WalkedRequest& r : wave.requests) {
+    wave.first.push_back(wave.points.size());
+    wave.points.insert(wave.points.end(), r.points.begin(), r.points.end());
+    times.counts += r.counts;
+  }
+  wave.answers.resize(wave.points.size());
+  times.points += wave.points.size();
+}
+
+void gather(const IndirectMethod& method, const CommittedScene& scene, std::span<const CachePoint> points,
+            std::span<Answer> answers, const Work& work) {
+  parallel_blocks(
+      points.size(), kGatherBlock, work.threads,
+      [&](size_t begin, size_t end) {
+        method.gather(scene, points.subspan(begin, end - begin), answers.subspan(begin, end - begin));
+      },
+      work.stop);
+}
+
+/// Asks, lets the method fill what it could not answer, and asks again.
+void answer(IndirectMethod& method, const CommittedScene& scene, Wavefront& wave, Work& work, WavefrontTimes& times) {
+  if (wave.points.empty()) return;
+  if (!method.traits().fills_holes) {
+    {
+      const Stopwatch watch(times.prepare);
+      method.prepare(scene, wave.points, work);
+    }
+    const Stopwatch watch(times.gather);
+    gather(method, scene, wave.points, wave.answers, work);
+    return;
+  }
+  std::vector<CachePoint> holes;
+  {
+    const Stopwatch watch(times.gather);
+    gather(method, scene, wave.points, wave.answers, work);
+    for (size_t i = 0; i < wave.points.size(); ++i)
+      if (!(wave.answers[i].weight > 0.0f)) holes.push_back(wave.points[i]);
+  }
+  times.holes += holes.size();
+  if (holes.empty() || work.stop.stop()) return;
+  {
+    const Stopwatch watch(times.prepare);
+    method.prepare(scene, holes, work);
+  }
+  if (work.stop.stop()) return;
+  const Stopwatch watch(times.gather);
+  gather(method, scene, wave.points, wave.answers, work);  // what was answered before may have a nearer record now
+}
+
+/// Shares answers between the first diffuse surfaces of neighbouring pixels.
+void share(std::span<const PixelRequest> requests, uint32_t interleave, Wavefront& wave, const Work& work,
+           WavefrontTimes& times) {
+  const Stopwatch watch(times.filter);
+  uint32_t x0 = ~0u, y0 = ~0u, x1 = 0, y1 = 0;
+  for (const PixelRequest& r : requests) {
+    x0 = std::min<uint32_t>(x0, r.x / r.step), y0 = std::min<uint32_t>(y0, r.y / r.step);
+    x1 = std::max<uint32_t>(x1, (r.x + r.width - 1u) / r.step + 1u);
+    y1 = std::max<uint32_t>(y1, (r.y + r.height - 1u) / r.step + 1u);
+  }
+  const uint32_t width = x1 - x0, height = y1 - y0;
+  std::vector<SharedIrradiance> grid(size_t(width) * height);
+  std::vector<Rgb> shared(grid.size());
+  const auto at = [&](const CachePoint& p) { return size_t(p.y - y0) * width + (p.x - x0); };
+  const auto takes_part = [](const CachePoint& p) { return p.layer == 0 && !p.translucent; };
+  for (size_t i = 0; i < wave.points.size(); ++i) {
+    const CachePoint& p = wave.points[i];
+    if (takes_part(p)) grid[at(p)] = {p.position, p.normal, p.footprint, wave.answers[i].light, true};
+  }
+  filter_discontinuities(grid, width, height, int(interleave / 2), shared, work.threads, work.stop);
+  if (work.stop.stop()) return;
+  for (size_t i = 0; i < wave.points.size(); ++i)
+    if (takes_part(wave.points[i])) wave.answers[i].light = shared[at(wave.points[i])];
+}
+
+void join(const FilmLayout& layout, const WalkSettings& settings, const Question& q, const Answer& answer, float* sums,
+          uint64_t& dropped) {
+  Rgb light = q.weight * answer.light;
+  const float sum = light.x + light.y + light.z;
+  if (!(std::fabs(light.x) + std::fabs(light.y) + std::fabs(light.z) <= path_tracing::kMostLight)) {
+    dropped++;
+    return;
+  }
+  const float limit = settings.clamp_indirect;
+  light = glm::max(sum > limit ? light * (limit / sum) : light, Rgb(0.0f));
+  const auto add = [&](Pass pass, const Rgb& value) {
+    const int at = layout[pass];
+    if (at < 0) return;
+    for (int c = 0; c < 3; ++c) sums[at + c] += value[c];
+  };
+  add(Pass::kCombined, light);
+  sums[layout[Pass::kBatches] + int(q.sample % kBatchCount)] += luminance(light);
+  if (q.direct) return add(Pass::kDiffuseIndirect, light);
+  add(Pass::kDiffuseIndirect, light * q.diffuse);
+  add(Pass::kGlossyIndirect, light * q.glossy);
+  add(Pass::kTransmissionIndirect, light * q.transmission);
+}
+
+void finish(std::span<const PixelRequest> requests, Film& film, Wavefront& wave, const WalkSettings& settings,
+            Work& work, WavefrontTimes& times) {
+  const Stopwatch watch(times.film);
+  const size_t floats = size_t(film.layout().floats);
+  std::atomic<uint64_t> dropped{0};
+  parallel_blocks(requests.size(), 8, work.threads, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      WalkedRequest& r = wave.requests[i];
+      uint64_t lost = 0;
+      for (size_t k = 0; k < r.questions.size(); ++k)
+        join(film.layout(), settings, r.questions[k], wave.answers[wave.first[i] + k],
+             r.sums.data() + floats * r.questions[k].pixel, lost);
+      dropped += lost;
+      const PixelRequest& request = requests[i];
+      const FilmSettings& f = film.settings();
+      size_t pixel = 0;
+      for (uint32_t y = request.y; y < uint32_t(request.y) + request.height; y += request.step)
+        for (uint32_t x = request.x; x < uint32_t(request.x) + request.width; x += request.step) {
+          if (request.skip && (x - f.x0) % request.skip == 0 && (y - f.y0) % request.skip == 0) continue;
+          film.add(x, y, r.sums.data() + floats * pixel++, request.count);
+        }
+      if (work.samples_done) *work.samples_done += sample_count(request);
+    }
+  });
+  times.dropped += dropped;
+}
+
+}  // namespace
+
+WalkKernel choose_walk_kernel(const Effects& effects, PassSet passes, bool local_view) {
+  const uint32_t features = path_tracing::kernel_features(effects, passes, local_view);
+  const bool straight = features & kFeatureStraight;
+  if (features & kFeaturePasses) return straight ? walk_request<15> : walk_request<13>;
+  return straight ? walk_request<7> : walk_request<5>;
+}
+
+void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std::span<const PixelRequest> all,
+                       Film& film, Work& work, const WalkSettings& settings, WavefrontTimes& times) {
+  const CameraRays camera(scene.scene.camera(), scene.scene.origin(), film.settings().width, film.settings().height);
+  const path_tracing::KernelInput input{.walk = {scene, settings.limits, work.shown, film.layout()[Pass::kUv] >= 0},
+                                        .camera = camera,
+                                        .film = film,
+                                        .clamp_direct = settings.clamp_direct,
+                                        .clamp_indirect = settings.clamp_indirect,
+                                        .seed = hash(uint32_t(work.seed), uint32_t(work.seed >> 32)),
+                                        .stop = work.stop};
+  const WalkKernel kernel = choose_walk_kernel(scene.effects, film.settings().passes, work.shown);
+  const uint32_t interleave = method.traits().interleave;
+  std::vector<PixelRequest> requests(all.begin(), all.end());
+  if (interleave > 1) {  // neighbours share what they found for the same sample
+    requests.clear();
+    uint32_t most = 0;
+    for (const PixelRequest& r : all) most = std::max(most, r.count);
+    for (uint32_t k = 0; k < most; ++k)
+      for (PixelRequest r : all)
+        if (k < r.count) r.first += k, r.count = 1, requests.push_back(r);
+  }
+  for (size_t begin = 0; begin < requests.size() && !work.stop.stop();) {
+    size_t end = begin;
+    uint64_t samples = 0;
+    do samples += sample_count(requests[end++]);
+    while (end < requests.size() && samples + sample_count(requests[end]) <= kMostSamples &&
+           (interleave == 1 || requests[end].first == requests[begin].first));
+    const std::span<const PixelRequest> part(requests.data() + begin, end - begin);
+    begin = end;
+    Wavefront wave;
+    walk(input, kernel, part, wave, work, times);
+    if (work.stop.stop()) return;
+    answer(method, scene, wave, work, times);
+    if (work.stop.stop()) return;
+    if (interleave > 1) share(part, interleave, wave, work, times);
+    if (work.stop.stop()) return;
+    finish(part, film, wave, settings, work, times);
+  }
+}
+
+}  // namespace afterglow

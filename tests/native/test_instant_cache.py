@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The temporal instant cache: after any edits its records equal fresh ones, and no more rays are traced than it takes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import afterglow
+import numpy as np
+import pytest
+from afterglow.scenes import Camera, Description, Light, look_at, node, rotate, scale, translate
+from afterglow.scenes.native import Built, graph
+from afterglow.scenes.rooms import background, cornell_box, diffuse, emission
+from afterglow.scenes.shapes import box, quad, sphere
+from hard_cases import render
+
+SETTINGS: dict[str, Any] = dict(method="INSTANT_CACHE", width=16, height=16, samples=1, virtual_lights=64, cache_verify=True,
+                                diffuse_bounces=3, cache_accuracy=0.05)
+
+
+class Live:
+    """A scene, a session that renders it by the cache, and what the cache says after each edit."""
+
+    def __init__(self, description: Description, **settings: Any) -> None:
+        self.built = Built(description)
+        self.scene = self.built.scene
+        self.settings = {**SETTINGS, **settings}
+        self.session = afterglow.Session(self.scene, self.settings)
+        self.session.start()
+        self.session.wait()
+
+    def edit(self, change: Any) -> dict[str, Any]:
+        with self.session.edit():
+            change()
+            self.scene.commit()
+        self.session.wait()
+        return self.numbers()
+
+    def numbers(self) -> dict[str, Any]:
+        found = self.session.statistics()
+        return {**found["values"], **{f"{kind}_rays": count for kind, count in found["rays"].items()}}
+
+    def image(self) -> np.ndarray:
+        return self.session.read()
+
+    def move(self, name: str, transform: Any) -> None:
+        self.scene.set_transforms(self.built.instances[name], np.asarray(transform, np.float64)[None])
+
+
+def number(live: Live, name: str) -> float:
+    found = live.numbers()
+    return float(found[name])
+
+
+def room(**more: Any) -> Description:
+    scene = cornell_box()
+    scene.materials["ball"] = diffuse((0.3, 0.5, 0.7))
+    scene.add("Ball", sphere(0.2, 16, 8), "ball", transform=translate((0.4, -0.3, 0.9)))
+    return scene
+
+
+def test_records_are_found_again_and_nothing_is_traced_without_a_change() -> None:
+    live = Live(room(), width=48, height=48)
+    first = live.numbers()
+    assert first["records"] > 20 and first["fill_rays"] > 0 and first["verified_differing"] == 0
+    live.session.update({"seed": 99})
+    live.session.wait()
+    again = live.numbers()
+    assert again["resets"] == first["resets"] and again["update_rays"] == 0
+    assert again["records_new"] <= 0.2 * first["records"]  # other points of the pixels were asked
+
+
+def test_the_cache_outlives_its_session() -> None:
+    live = Live(room())
+    before = live.numbers()
+    del live.session
+    live.session = afterglow.Session(live.scene, live.settings)
+    live.session.start()
+    live.session.wait()
+    after = live.numbers()
+    assert after["records"] == before["records"] and after["fill_rays"] == before["fill_rays"]
+
+
+def test_colour_and_strength_trace_no_visibility_ray() -> None:
+    live = Live(room())
+    lamp = live.built.lights["Lamp"]
+    before = live.numbers()
+    dim = live.edit(lambda: live.scene.set_light(lamp, color=(0.1, 0.5, 1.0), power=3.0))
+    assert dim["update_rays"] == before["update_rays"] and dim["lights_recoloured"] > 0 and dim["verified_worst"] <= 1e-5
+    red = live.edit(lambda: live.scene.set_material(live.built.materials["red"], graph(diffuse((0.1, 0.2, 0.9)))))
+    assert red["update_rays"] == before["update_rays"] and red["lights_recoloured"] > 0 and red["verified_worst"] <= 1e-5
+
+
+def test_only_rays_that_a_moved_object_can_touch_are_traced() -> None:
+    live = Live(room(), width=48, height=48)
+    pairs = number(live, "records") * 64
+    moved = live.edit(lambda: live.move("Ball", translate((0.45, -0.3, 0.9))))
+    assert moved["verified_differing"] == 0 and moved["records_moved"] > 0
+    assert 0 < moved["update_rays"] < 0.25 * pairs
+
+
+def test_an_object_that_leaves_and_returns_in_one_step_costs_nothing() -> None:
+    live = Live(room())
+    before = live.numbers()
+
+    def there_and_back() -> None:
+        live.move("Ball", translate((0, 0, 5)))
+        live.move("Ball", translate((0.4, -0.3, 0.9)))
+
+    after = live.edit(there_and_back)
+    assert after["update_rays"] == before["update_rays"] and after["verified_differing"] == 0
+
+
+def test_lights_off_and_on_again() -> None:
+    live = Live(room())
+    lamp, power = live.built.lights["Lamp"], 25.0
+    lit = live.image()
+    dark = live.edit(lambda: live.scene.set_light(lamp, power=0.0))
+    assert dark["verified_worst"] <= 1e-5 and live.image()[..., :3].max() == 0.0
+    back = live.edit(lambda: live.scene.set_light(lamp, power=power))
+    assert back["verified_worst"] <= 1e-5
+    assert np.allclose(live.image(), lit, rtol=1e-4, atol=1e-5)
+
+
+def test_a_moving_object_holds_records_lights_and_the_camera() -> None:
+    scene = Description("box", Camera(look_at((0, -0.8, 0), (0, 1, 0)), math.radians(80)))
+    scene.materials.update(white=diffuse((0.7, 0.7, 0.7)), lamp=emission(4.0))
+    scene.add("Room", box((-1, -1, -1), (1, 1, 1), inward=True), "white")
+    scene.add("Lamp", quad((-0.2, -0.2, 0.9), (-0.2, 0.2, 0.9), (0.2, 0.2, 0.9), (0.2, -0.2, 0.9)), "lamp")
+    live = Live(scene, virtual_lights=512)
+    whole = live.image()
+    turn = translate((3, 2, 1)) @ rotate(0.7)
+
+    def carry() -> None:
+        live.move("Room", turn)
+        live.move("Lamp", turn)
+        live.built.description.camera.transform = turn @ scene.camera.transform
+        live.built.set_camera((16, 16), 0)
+
+    numbers = live.edit(carry)
+    assert numbers["verified_differing"] == 0
+    assert abs(live.image()[..., :3].mean() / whole[..., :3].mean() - 1) < 0.15
+
+
+def random_edit(live: Live, rng: np.random.Generator, state: dict[str, Any]) -> None:
+    """One edit of a random kind, some with several objects at once."""
+    scene, built = live.scene, live.built
+    place = lambda: translate(rng.uniform((-0.7, -0.7, 0.2), (0.7, 0.7, 1.6)))  # noqa: E731
+    kind = int(rng.integers(14))
+    if kind in (0, 1):
+        live.move("Ball", place() @ rotate(float(rng.uniform(0, 6))) @ scale(rng.uniform(0.3, 2.0, 3)))
+    elif kind == 2:
+        live.move("Tall", place() @ scale((0.4, 0.4, 0.4)))
+        live.move("Low", place() @ scale((0.3, -0.3, 0.3)))
+    elif kind == 3:
+        rest = sphere(0.2, 8 if state.get("mesh") else 16, 8).positions
+        scene.set_mesh(built.meshes["Ball"], positions=(rest * rng.uniform(0.3, 2, 3)).astype(np.float32))
+    elif kind == 4:
+        above = rng.uniform((-0.5, -0.5, 1.6), (0.5, 0.5, 1.95))
+        scene.set_light(built.lights["Lamp"], transform=look_at(above, (0, 0, 0), (0, 1, 0)))
+    elif kind == 5:
+        scene.set_light(built.lights["Lamp"], color=tuple(rng.uniform(0, 1, 3)), power=float(rng.uniform(0, 40)))
+    elif kind == 6:
+        scene.set_material(built.materials["white"], graph(diffuse(tuple(rng.uniform(0, 0.9, 3)))))
+    elif kind == 7:
+        scene.set_instances(built.instances["Ball"], visibility=int(rng.choice([afterglow.ALL_RAYS, 0, afterglow.CAMERA])))
+    elif kind == 8:
+        if state.get("extra") is None:
+            red = built.materials["red"]
+            state["extra"] = scene.add_instances(built.meshes["Ball"], place()[None], name="Extra", materials=[red])
+        else:
+            scene.remove_instances(state["extra"])
+            state["extra"] = None
+    elif kind == 9:
+        clear = node("transparent_bsdf", color=tuple(rng.uniform(0.2, 1, 3)))
+        scene.set_material(built.materials["ball"], graph(clear if rng.random() < 0.5 else diffuse((0.5, 0.5, 0.5))))
+    elif kind == 10:
+        scene.set_world(graph(background((0.3, 0.5, 1.0), float(rng.uniform(0, 1)))))
+    elif kind == 11:
+        state["mesh"] = not state.get("mesh", False)
+        mesh = sphere(0.2, 8 if state["mesh"] else 16, 8)
+        scene.set_mesh(built.meshes["Ball"], name="Ball", positions=mesh.positions, triangles=mesh.triangles)
+    elif kind == 12:
+        scene.set_instances(built.instances["Low"], materials=[built.materials[str(rng.choice(["red", "green", "ball"]))]])
+    else:
+        live.move("Ball", place())
+        scene.set_light(built.lights["Lamp"], color=tuple(rng.uniform(0.1, 1, 3)))
+        scene.set_material(built.materials["green"], graph(diffuse(tuple(rng.uniform(0, 0.9, 3)))))
+
+
+def run_edits(count: int, seed: int, **settings: Any) -> None:
+    live, rng, state = Live(room(), **settings), np.random.default_rng(seed), {}
+    for step in range(count):
+        numbers = live.edit(lambda: random_edit(live, rng, state))
+        assert numbers["verified_worst"] <= 1e-5, (step, numbers["verified_differing"], numbers["verified_records"])
+        assert np.isfinite(live.image()).all()
+    assert live.numbers()["records"] > 10
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_records_equal_fresh_ones_after_random_edits(seed: int) -> None:
+    run_edits(150, seed)
+
+
+@pytest.mark.slow
+def test_records_equal_fresh_ones_after_ten_thousand_edits() -> None:
+    run_edits(10_000, 3, width=8, height=8, virtual_lights=32)
+
+
+def test_repair_on_demand_shows_the_same_image() -> None:
+    images = []
+    for on_demand in (False, True):
+        live, rng, state = Live(room(), cache_on_demand=on_demand), np.random.default_rng(8), {}
+        for _ in range(12):
+            numbers = live.edit(lambda: random_edit(live, rng, state))
+            assert numbers["verified_worst"] <= 1e-5
+        images.append(live.image())
+    assert abs(images[0] - images[1]).mean() < 0.02 * images[0][..., :3].mean()
+
+
+def test_one_and_two_threads_show_the_same_image_through_edits() -> None:
+    images = []
+    for threads in (1, 2):
+        live, rng, state = Live(room(), threads=threads, width=40, height=30), np.random.default_rng(4), {}
+        for _ in range(8):
+            live.edit(lambda: random_edit(live, rng, state))
+        images.append(live.image())
+    assert np.array_equal(images[0], images[1])
+
+
+@pytest.mark.parametrize("clear", [False, True])
+def test_a_record_with_256_lights_takes_little_memory(clear: bool) -> None:
+    scene = room()
+    if clear:
+        scene.materials["ball"] = node("transparent_bsdf", color=(0.9, 0.5, 0.2))
+    live = Live(scene, virtual_lights=256, width=64, height=64)
+    numbers = live.numbers()
+    assert numbers["record_bytes"] <= 1126
+    assert numbers["cache_bytes"] / numbers["records"] <= 2.5 * 1126  # octree and room to grow included
+
+
+def test_the_image_is_that_of_instant_radiosity() -> None:
+    settings = dict(size=160, samples=2, virtual_lights=256, interleave=False, passes=["diffuse_indirect"])
+    for scene in (room(), cornell_box("statue")):
+        every = render(scene, method="INSTANT_RADIOSITY", **settings).passes["diffuse_indirect"]
+        cached = render(scene, method="INSTANT_CACHE", **settings).passes["diffuse_indirect"]
+        assert abs(cached.mean() / every.mean() - 1) < 0.02
+        assert np.mean(np.abs(cached - every)) < 0.12 * every.mean()  # finer settings: the next test
+
+
+def test_finer_accuracy_comes_nearer() -> None:
+    settings = dict(size=64, samples=2, virtual_lights=128, interleave=False, passes=["diffuse_indirect"])
+    every = render(room(), method="INSTANT_RADIOSITY", **settings).passes["diffuse_indirect"]
+    off = [np.abs(render(room(), method="INSTANT_CACHE", cache_accuracy=a, **settings).passes["diffuse_indirect"] - every).mean()
+           for a in (0.2, 0.05, 0.0005)]
+    assert off[0] > off[1] > off[2] and off[2] < 0.02 * every.mean()
+
+
+@pytest.mark.parametrize("count", [1, 65536])
+def test_extremes_of_virtual_lights(count: int) -> None:
+    live = Live(room(), virtual_lights=count, width=6, height=6, cache_verify=False)
+    assert live.image()[..., :3].mean() > 0.01 and live.numbers()["virtual_lights"] <= count
+
+
+@pytest.mark.parametrize("gap", [1e-4, 2e-4])
+def test_thin_walls_do_not_leak(gap: float) -> None:
+    """Two walls a ten-thousandth of the room apart: the lit one's light stays on its side."""
+    scene = Description("walls", Camera(look_at((-1.5, -0.5, 0.3), (0, 0, 0)), math.radians(60)))
+    scene.materials["white"] = diffuse((0.8, 0.8, 0.8))
+    scene.add("Room", box((-2, -1, -1), (2, 1, 1), inward=True), "white")
+    scene.add("Left", quad((0, -1, -1), (0, 1, -1), (0, 1, 1), (0, -1, 1)), "white")
+    scene.add("Right", quad((2 * gap, -1, -1), (2 * gap, 1, -1), (2 * gap, 1, 1), (2 * gap, -1, 1)), "white")
+    scene.lights = [Light("L", "point", translate((1, 0, 0.5)), 1000.0)]
+    assert render(scene, method="INSTANT_CACHE", size=32, samples=2).image[..., :3].max() == 0.0
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e4])
+def test_any_size_of_scene_shows_the_same(size: float) -> None:
+    def scaled(factor: float) -> Description:
+        scene = cornell_box("emissive")
+        for item in scene.objects:
+            item.transforms = scale((factor,) * 3)[None] @ item.transforms
+        scene.camera.transform = scale((factor,) * 3) @ scene.camera.transform
+        scene.camera.transform[:3, :3] /= factor
+        scene.camera.clip = (0.0, float("inf"))
+        return scene
+
+    settings = dict(method="INSTANT_CACHE", size=32, samples=8, passes=["diffuse_indirect"])
+    one = render(scaled(1.0), **settings).passes["diffuse_indirect"]
+    other = render(scaled(size), **settings).passes["diffuse_indirect"]
+    assert abs(other.mean() / one.mean() - 1) < 0.03
