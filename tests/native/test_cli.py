@@ -62,11 +62,11 @@ def test_bench_refuses_unknown_sets(library: Path) -> None:
 
 @pytest.mark.slow
 def test_bench_writes_its_figures(library: Path, root: Path, tmp_path: Path) -> None:
-    ended = run(library, "bench", "foundation", "--only", "threads", "--output", str(tmp_path), cwd=root,
+    ended = run(library, "bench", "foundation", "--figure", "threads", "--output", str(tmp_path), cwd=root,
                 AFTERGLOW_SHARED=str(tmp_path))
-    data = json.loads((tmp_path / "foundation.json").read_text())
+    data = json.loads((tmp_path / "foundation_threads.json").read_text())
     assert set(data) == {"machine", "versions", "figures"} and data["versions"]["embree"]
     assert all(f["holds"] for f in data["figures"]) and ended.returncode == 0, ended.stdout
     wanted = {"figure", "scene", "value", "unit", "peer", "peer_value", "ratio", "goal", "holds", "command"}
     assert all(wanted <= set(f) for f in data["figures"])
-    ElementTree.parse(tmp_path / "foundation.svg")
+    ElementTree.parse(tmp_path / "foundation_threads.svg")
