@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The list of all methods: a new one is its folder and one line here.
 #include "base/errors.h"
+#include "methods/hash_cache/hash_cache.h"
 #include "methods/instant_cache/instant_cache.h"
 #include "methods/instant_radiosity/instant_radiosity.h"
 #include "methods/path_tracing/path_tracing.h"
@@ -18,6 +19,7 @@ constexpr Entry kEntries[] = {
     {path_tracing::describe, path_tracing::make},
     {instant_cache::describe, instant_cache::make},
     {instant_radiosity::describe, instant_radiosity::make},
+    {hash_cache::describe, hash_cache::make},
 };
 
 }  // namespace

@@ -14,6 +14,11 @@
 //   void diffuse(const PathState&, const SurfacePoint&, const Surface& diffuse_lobes)
 // and answers for the light that other surfaces send there: the walk goes on through the other lobes alone, and the
 // light sources that it looks for are not weighed against diffuse directions that are never taken.
+// A visitor that names a type Carries keeps throughputs of its own, from several vertices of the path at once. It is
+// also told
+//   void turned(const BsdfSample&)        a direction was asked for, valid or not, after the choice not to go straight
+//   Rgb carried(const Rgb& factor)        what the throughput was multiplied with, for whatever reason
+// and answers with the throughput by which roulette decides from there on.
 #pragma once
 
 #include "base/cancel.h"
@@ -57,6 +62,11 @@ inline Ray shadow_ray(const SurfacePoint& from, const LightSample& light) {
 template <class Visitor>
 inline constexpr bool kSplits = requires {
   typename Visitor::SplitsDiffuse;
+};
+
+template <class Visitor>
+inline constexpr bool kCarries = requires {
+  typename Visitor::Carries;
 };
 
 template <uint32_t kFeatures>
@@ -116,12 +126,13 @@ class Walker {
       if constexpr (kStraight) {
         if (straight > 0.0f && u_straight < straight) {
           pass_straight(path, point, surface.transparency / straight);
-          if (!survives(path, u_end)) return;
+          if constexpr (kCarries<Visitor>) path.throughput = visitor.carried(surface.transparency / straight);
+          if (!survives(path, u_end, visitor)) return;
           continue;
         }
       }
       if (!surface.count || !scatter(path, point, surface, 1.0f - straight, u_lobe, u, visitor)) return;
-      if (!survives(path, u_end)) return;
+      if (!survives(path, u_end, visitor)) return;
       counts_.bounce++;
     }
   }
@@ -153,10 +164,12 @@ class Walker {
   }
 
   /// Russian roulette, before the next ray is traced: what it would cost is what is to be saved.
-  static bool survives(PathState& path, float u) {
+  template <class Visitor>
+  static bool survives(PathState& path, float u, [[maybe_unused]] Visitor& visitor) {
     const float p = survival(path.throughput, path.context.depth, kStraight ? path.context.transparent_depth : 0);
     if (p >= 1.0f) return true;
     path.throughput /= p;
+    if constexpr (kCarries<Visitor>) path.throughput = visitor.carried(Rgb(1.0f / p));
     return u < p;
   }
 
@@ -281,9 +294,11 @@ class Walker {
   bool scatter(PathState& path, const SurfacePoint& point, const Surface& surface, float share, float u_lobe,
                const Vec2& u, Visitor& visitor) const {
     const BsdfSample s = sample<!kLobes>(surface, point.face_normal, point.outgoing, u_lobe, u);
+    if constexpr (kCarries<Visitor>) visitor.turned(s);
     if (!s.valid || !(s.value.density > 0.0f)) return false;
     visitor.scattered(path, s);
     path.throughput *= s.value.total() / (s.value.density * share);
+    if constexpr (kCarries<Visitor>) path.throughput = visitor.carried(s.value.total() / (s.value.density * share));
     if (is_black(path.throughput)) return false;
     path.density = s.delta ? 0.0f : s.value.density * share;
     path.position = point.position;

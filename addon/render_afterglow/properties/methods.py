@@ -13,7 +13,7 @@ import bpy
 from .. import backend
 
 # Numbers that files hold already; a method that is not here gets one from its name, which is as lasting.
-METHOD_NUMBERS = {"AUTO": 0, "PATH_TRACING": 1, "INSTANT_RADIOSITY": 2, "INSTANT_CACHE": 3}
+METHOD_NUMBERS = {"AUTO": 0, "PATH_TRACING": 1, "INSTANT_RADIOSITY": 2, "INSTANT_CACHE": 3, "HASH_CACHE": 4}
 
 _groups: dict[str, type] = {}
 

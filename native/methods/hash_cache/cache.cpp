@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Filling and asking: see cache.h.
+#include "methods/hash_cache/cache.h"
+
+#include <chrono>
+
+#include "base/parallel.h"
+
+namespace afterglow::hash_cache {
+
+namespace {
+
+constexpr float kEnough = 0.01f;  // share of the light that the levels above need not bring
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+/// From blue over green to red.
+Rgb scale_color(float t) {
+  t = std::clamp(t, 0.0f, 1.0f);
+  return glm::clamp(Rgb(2.0f * t - 1.0f, 1.0f - std::fabs(2.0f * t - 1.0f), 1.0f - 2.0f * t), Rgb(0.0f), Rgb(1.0f));
+}
+
+}  // namespace
+
+void Cache::configure(const CacheSettings& settings) {
+  if (!(settings.caching == settings_.caching)) stale_ = true;
+  settings_ = settings;
+  table_.set_limit(settings.limit);
+}
+
+void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Work& work) {
+  SceneChanges seen = changes;
+  seen.camera = false;
+  const InstanceMask shown = work.shown ? *work.shown : InstanceMask{};
+  const bool elsewhere = stale_ || changes.everything || changes.origin || shown != shown_instances_;
+  if (elsewhere || (!seen.empty() && !settings_.keep)) {
+    table_.clear();
+    grid_ = Grid(scene.scene.bounds());
+    counts_.resets++;
+    renders_ = stamp_ = 0;
+  } else if (!seen.empty()) {
+    table_.forget(settings_.keep);
+  }
+  stale_ = false;
+  shown_instances_ = shown;
+  seed_ = hash(hash(uint32_t(work.seed), uint32_t(work.seed >> 32)), renders_++, 0x48617368u);  // never a path twice
+  stamp_++;
+  pass_ = work.pass;
+}
+
+bool Cache::trace(const WalkScene& walk, std::span<const CachePoint> points, Work& work) {
+  const double begun = now();
+  RayCounts rays;
+  std::vector<Sample> samples = cache_paths(walk, grid_, settings_.caching, points, seed_, work, rays);
+  const double traced = now();
+  counts_.seconds_paths += traced - begun;
+  if (work.stop.stop()) return false;
+  counts_.paths += points.size(), counts_.samples += samples.size();
+  counts_.rays += rays.bounce, counts_.shadow_rays += rays.shadow, counts_.dropped += rays.dropped;
+  counts_.cells += table_.add(std::move(samples), stamp_, work.threads, work.stop);
+  counts_.seconds_table += now() - traced;
+  return !work.stop.stop();
+}
+
+void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points, Work& work) {
+  if (work.pass != pass_) pass_ = work.pass, stamp_++;
+  WalkScene walk{scene, settings_.caching.walk.limits, shown_instances_.empty() ? nullptr : &shown_instances_, false};
+  const uint32_t more = settings_.caching.store;  // every stored vertex counts its own scatterings
+  walk.limits.max_bounces += more, walk.limits.diffuse += more, walk.limits.glossy += more;
+  walk.limits.transmission += more, walk.limits.transparent += more;
+  if (settings_.resolution >= 1.0f) {
+    trace(walk, points, work);
+    return;
+  }
+  std::vector<CachePoint> chosen, rest;
+  for (const CachePoint& p : points)
+    (unit_float(hash(hash_of(p, seed_), p.sample, 1)) < settings_.resolution ? chosen : rest).push_back(p);
+  if (!trace(walk, chosen, work)) return;
+  std::vector<uint8_t> open(rest.size());
+  parallel_blocks(rest.size(), 256, work.threads, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) open[i] = !(answer(rest[i]).weight > 0.0f);
+  });
+  std::vector<CachePoint> holes;
+  for (size_t i = 0; i < rest.size(); ++i)
+    if (open[i]) holes.push_back(rest[i]);
+  counts_.holes += holes.size();
+  if (!holes.empty()) trace(walk, holes, work);
+}
+
+/// At a place beside the point, where there is such a cell of the same object and side, else at the point.
+const Record* Cache::look_up(const CachePoint& p, const Vec3& offset, uint32_t owner, int level) const {
+  const Record* record = table_.find(grid_.cell(p.position + offset * grid_.size(level), owner, level));
+  return record ? record : table_.find(grid_.cell(p.position, owner, level));
+}
+
+Answer Cache::answer(const CachePoint& p) const {
+  const uint32_t owner = owner_of(p.instance, p.face_normal);
+  const float wanted = grid_.level(p.footprint * settings_.caching.cell_pixels);
+  const int finest = int(wanted);
+  const uint32_t random = hash(hash_of(p, seed_), p.sample, 2);
+  const Frame frame(p.face_normal);
+  const Vec3 offset = settings_.jitter * ((2.0f * unit_float(random) - 1.0f) * frame.t +
+                                          (2.0f * unit_float(hash(random)) - 1.0f) * frame.b);
+  Rgb light(0.0f);
+  float missing = 1.0f, samples = 0.0f;
+  for (int level = finest; level <= kTopLevel && missing > kEnough; ++level) {
+    // A cell longer than the way that the ray came holds light of places that the ray has left long ago.
+    if (level > finest + 1 && missing < 1.0f && grid_.size(level) > p.segment) break;
+    const Record* record = look_up(p, offset, owner, level);
+    if (!record) continue;
+    const float share = (level == finest ? 1.0f - (wanted - float(finest)) : 1.0f);
+    const float taken = missing * share * trust(record->count(), settings_.trusted);
+    light += taken * shown(*record, p, level);
+    samples += taken * float(record->count());
+    missing -= taken;
+  }
+  if (!(missing < 1.0f)) return {};
+  const float found = 1.0f - missing;
+  return {kPi / found * light, 1.0f, 1.0f / std::sqrt(1.0f + samples / found)};
+}
+
+/// Light, or what a debug view shows in its place.
+Rgb Cache::shown(const Record& record, const CachePoint& p, int level) const {
+  switch (settings_.view) {
+    case View::kLight:
+      return record.light;
+    case View::kLevel:
+      return scale_color(float(level % 8) / 7.0f);
+    case View::kCount:
+      return scale_color(std::log2(float(record.count())) / 20.0f);
+    case View::kAge:
+      return scale_color(float((stamp_ - record.stamp()) % Record::kStamps) / 64.0f);
+    case View::kSide:
+      return 0.5f + 0.5f * p.face_normal;
+  }
+  return record.light;
+}
+
+}  // namespace afterglow::hash_cache

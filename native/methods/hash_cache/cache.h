@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The cells of one scene, filled by paths and asked for light: caching and reconstruction of Roth et al. 2020 (3.2 and
+// 3.3), apart from the camera's walk, which is the renderer's.
+#pragma once
+
+#include <string>
+
+#include "methods/hash_cache/caching.h"
+
+namespace afterglow::hash_cache {
+
+enum class View { kLight, kLevel, kCount, kAge, kSide };
+
+struct CacheSettings {
+  CachingSettings caching;
+  float resolution = 1.0f;  // share of the questions that send a path (the caching resolution factor, squared)
+  float jitter = 0.5f;      // of look-ups, in cell widths (s_j)
+  float trusted = 32.0f;    // samples from which on a cell answers alone
+  uint32_t keep = 0;        // samples that a cell keeps when the scene changes; 0: starts anew
+  size_t limit = size_t(1) << 30;
+  View view = View::kLight;
+};
+
+struct CacheCounts {
+  uint64_t paths = 0, samples = 0, cells = 0, rays = 0, shadow_rays = 0, dropped = 0, holes = 0, resets = 0;
+  double seconds_paths = 0.0, seconds_table = 0.0;
+};
+
+class Cache {
+ public:
+  void configure(const CacheSettings&);
+  /// What the edits touched is forgotten: everything, or all but a few samples of each cell.
+  void update(const CommittedScene&, const SceneChanges&, Work&);
+  /// One path from each chosen point, and from each that no cell could answer.
+  void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
+  Answer answer(const CachePoint&) const;
+  const CacheCounts& counts() const { return counts_; }
+  const Table& table() const { return table_; }
+
+ private:
+  const Record* look_up(const CachePoint&, const Vec3& offset, uint32_t owner, int level) const;
+  Rgb shown(const Record&, const CachePoint&, int level) const;
+  bool trace(const WalkScene&, std::span<const CachePoint>, Work&);
+
+  CacheSettings settings_;
+  bool stale_ = true;
+  Grid grid_;
+  Table table_;
+  InstanceMask shown_instances_;
+  uint32_t seed_ = 0, renders_ = 0, stamp_ = 0, pass_ = 0;
+  CacheCounts counts_;
+};
+
+}  // namespace afterglow::hash_cache

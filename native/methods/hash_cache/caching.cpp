@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The walk that fills cells: see caching.h. Roth et al. 2020, (1), with two differences: the light of vertex j is
+// multiplied with the throughputs between j' and j alone, because what is found at j has been reflected there already,
+// and nothing is ever divided by an albedo, because a vertex starts its own product behind itself.
+#include "methods/hash_cache/caching.h"
+
+#include <mutex>
+
+#include "base/parallel.h"
+
+namespace afterglow::hash_cache {
+
+namespace {
+
+constexpr uint32_t kMostStored = 16;
+constexpr float kMostLight = 1e30f;  // what is above is dropped and counted, as in the path tracer
+constexpr size_t kBlock = 128;
+
+/// A vertex of the path that keeps a sample, and how much of the light that is found now would arrive there.
+struct Stored {
+  Vec3 position, face_normal, normal;
+  uint32_t instance = 0;
+  Rgb throughput{0.0f};  // cos / (pi × density) of the direction taken, times all factors since
+  Rgb light{0.0f};       // irradiance / pi
+  PathContext counts;    // scatterings as if the path began here: the limits are the path tracer's
+  bool sampled = false;  // a direction was asked for
+  bool live = false;     // light still counts
+  bool last = false;     // only light that is run into
+};
+
+class StoringVisitor {
+ public:
+  using Carries = void;
+  StoringVisitor(const WalkLimits& limits, uint32_t store) : limits_(limits), store_(std::min(store, kMostStored)) {}
+
+  /// The point that asks, and the direction taken from there in proportion to the cosine.
+  void begin(const CachePoint& p, PathContext& context) {
+    count_ = 0, pending_ = 0;
+    vertices_ = 1;
+    Stored& first = stored_[count_++] = Stored{};
+    first.position = p.position, first.face_normal = p.face_normal, first.normal = p.normal;
+    first.instance = p.instance;
+    first.throughput = Rgb(1.0f);
+    first.sampled = first.live = true;
+    first.last = count_bounce(first.counts, limits_, LobeClass::kDiffuse, p.translucent, false);
+    context = first.counts;
+  }
+
+  std::span<const Stored> stored() const { return {stored_, count_}; }
+
+  void traced(const Ray&, bool) {}
+  bool surface(const PathState&, const SurfacePoint& point, const Surface& surface) {
+    pending_ = count_;
+    bool front = false, back = false;
+    for (int i = 0; i < surface.count; ++i) {
+      front |=
+          surface.lobes[i].kind < LobeKind::kMicrofacetReflection && surface.lobes[i].kind != LobeKind::kTranslucent;
+      back |= surface.lobes[i].kind == LobeKind::kTranslucent;
+    }
+    if ((front || back) && vertices_ < store_) {
+      vertices_++;
+      if (front) store(point, 1.0f);
+      if (back) store(point, -1.0f);
+    }
+    if (pending_ < count_ || !is_black(surface.transparency)) return true;
+    for (const Stored& s : stored())
+      if (s.live && !s.last) return true;
+    return false;
+  }
+  void lit(const PathState&, const BsdfValue& value, const Rgb& light) {
+    const Rgb found = value.total() * light;
+    for (uint32_t i = 0; i < pending_; ++i)
+      if (Stored& s = stored_[i]; s.live && !s.last) s.light += s.throughput * found;
+  }
+  /// A vertex's own direct light is looked for where the picture is made.
+  void emitted(const PathState&, const Rgb& light) {
+    for (uint32_t i = 0; i < count_; ++i)
+      if (Stored& s = stored_[i]; s.live && s.counts.depth > 1) s.light += s.throughput * light;
+  }
+  void escaped(const PathState& path, const Rgb& light) {
+    if (!is_black(light)) emitted(path, light);
+  }
+  void held_out(const PathState&, float) {}
+  void scattered(const PathState&, const BsdfSample&) {}
+
+  void turned(const BsdfSample& s) {
+    for (uint32_t i = 0; i < pending_; ++i) {
+      Stored& before = stored_[i];
+      if (!before.live) continue;
+      if (before.last || !s.valid)
+        before.live = false;
+      else
+        before.last = count_bounce(before.counts, limits_, s.pass, s.transmitted, s.delta);
+    }
+    for (uint32_t i = pending_; i < count_; ++i) {  // the surface that the path has just left
+      Stored& here = stored_[i];
+      here.sampled = true;
+      const float cosine = glm::dot(here.normal, s.direction);
+      if (!s.valid || s.delta || !(s.value.density > 0.0f) || !(cosine > 0.0f)) continue;
+      if (!(glm::dot(here.face_normal, s.direction) > 0.0f)) continue;
+      here.throughput = Rgb(cosine / (kPi * s.value.density));
+      here.live = true;
+      here.last = count_bounce(here.counts, limits_, s.pass, s.transmitted, s.delta);
+    }
+  }
+  Rgb carried(const Rgb& factor) {
+    Rgb most(0.0f);
+    for (uint32_t i = 0; i < count_; ++i) {
+      Stored& s = stored_[i];
+      if (!s.live) continue;
+      if (i < pending_) s.throughput *= factor;
+      most = glm::max(most, s.throughput);
+    }
+    pending_ = count_;
+    return most;
+  }
+
+ private:
+  void store(const SurfacePoint& point, float side) {
+    if (count_ == kMostStored) return;
+    Stored& s = stored_[count_++] = Stored{};
+    s.position = point.position, s.instance = point.instance;
+    s.face_normal = point.face_normal * side, s.normal = point.normal * side;
+  }
+
+  const WalkLimits& limits_;
+  const uint32_t store_;
+  Stored stored_[kMostStored];
+  uint32_t count_ = 0, pending_ = 0;  // of stored vertices; of those before the surface where the path stands
+  uint32_t vertices_ = 0;             // surfaces that keep samples, whatever the sides
+};
+
+struct PathInput {
+  const WalkScene& walk;
+  const Grid& grid;
+  const CachingSettings& settings;
+  WalkLimits limits;  // of each stored vertex
+  uint32_t seed;
+};
+
+SurfacePoint start_of(const CachePoint& p) {
+  SurfacePoint point;
+  point.position = p.position, point.face_normal = p.face_normal, point.error = p.error;
+  return point;
+}
+
+template <uint32_t kFeatures>
+void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<Sample>& out, RayCounts& counts) {
+  const Walker<kFeatures> walker(in.walk, counts);
+  StoringVisitor visitor(in.limits, in.settings.store);
+  for (const CachePoint& p : points) {
+    Sampler sampler(hash_of(p, in.seed), p.sample);
+    const Vec2 u = sampler.next2();
+    PathState path;
+    visitor.begin(p, path.context);
+    const float radius = std::sqrt(u.x), phi = 2.0f * kPi * u.y, z = std::sqrt(std::fmax(0.0f, 1.0f - u.x));
+    const Vec3 direction = Frame(p.normal).to_world({radius * std::cos(phi), radius * std::sin(phi), z});
+    if (z > 0.0f && glm::dot(direction, p.face_normal) > 0.0f && !visitor.stored()[0].last) {
+      path.density = z * kInvPi;
+      path.position = p.position, path.light_normal = p.normal;
+      path.ray.origin = offset_origin(start_of(p), direction);
+      path.ray.direction = direction;
+      path.ray.mask = visibility_of(path.context.kind);
+      path.context.footprint = p.footprint;
+      walker.walk(path, sampler, visitor);
+      counts.camera--, counts.bounce++;  // no ray of the camera
+    }
+    const int level = int(in.grid.level(p.footprint * in.settings.cell_pixels));
+    for (const Stored& s : visitor.stored()) {
+      if (!s.sampled) continue;
+      const float sum = s.light.x + s.light.y + s.light.z;
+      if (!(std::fabs(s.light.x) + std::fabs(s.light.y) + std::fabs(s.light.z) <= kMostLight)) {
+        counts.dropped++;
+        continue;
+      }
+      const float limit = in.settings.walk.clamp_indirect;
+      const Rgb light = glm::max(sum > limit ? s.light * (limit / sum) : s.light, Rgb(0.0f));
+      out.push_back({in.grid.cell(s.position, owner_of(s.instance, s.face_normal), level), light, 1});
+    }
+  }
+}
+
+}  // namespace
+
+bool CachingSettings::operator==(const CachingSettings& o) const {
+  const WalkLimits &a = walk.limits, &b = o.walk.limits;
+  return store == o.store && length == o.length && cell_pixels == o.cell_pixels && a.max_bounces == b.max_bounces &&
+         a.diffuse == b.diffuse && a.glossy == b.glossy && a.transmission == b.transmission &&
+         a.transparent == b.transparent && a.caustics_reflective == b.caustics_reflective &&
+         a.caustics_refractive == b.caustics_refractive && walk.clamp_indirect == o.walk.clamp_indirect;
+}
+
+std::vector<Sample> cache_paths(const WalkScene& walk, const Grid& grid, const CachingSettings& settings,
+                                std::span<const CachePoint> points, uint32_t seed, const Work& work,
+                                RayCounts& counts) {
+  PathInput in{walk, grid, settings, settings.walk.limits, seed};
+  if (settings.length) in.limits.max_bounces = std::min(in.limits.max_bounces, settings.length);
+  const bool straight = walk.scene.effects.has(kTransparency) || walk.scene.effects.has(kRayVisibility) || walk.shown;
+  std::vector<std::vector<Sample>> blocks((points.size() + kBlock - 1) / kBlock);
+  std::mutex mutex;
+  parallel_blocks(
+      points.size(), kBlock, work.threads,
+      [&](size_t begin, size_t end) {
+        if (work.stop.stop()) return;
+        RayCounts own;
+        (straight ? trace<kFeatureLobes | kFeatureShapes | kFeatureStraight>
+                  : trace<kFeatureLobes | kFeatureShapes>)(in, points.subspan(begin, end - begin),
+                                                           blocks[begin / kBlock], own);
+        const std::lock_guard lock(mutex);
+        counts += own;
+      },
+      work.stop);
+  std::vector<Sample> samples;
+  if (work.stop.stop()) return samples;
+  for (const auto& block : blocks) samples.insert(samples.end(), block.begin(), block.end());
+  return samples;
+}
+
+}  // namespace afterglow::hash_cache

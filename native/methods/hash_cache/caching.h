@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Light for the cells: paths that go on from points which the camera saw, with next-event estimation and multiple
+// importance sampling, and leave a sample of irradiance at each of their first diffuse surfaces (Roth et al. 2020, 3.2,
+// figure 4). Each of these surfaces gets the light of as many further vertices as the path tracer would give it.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "methods/hash_cache/table.h"
+#include "methods/method.h"
+#include "methods/walk_settings.h"
+#include "transport/path_walker.h"
+
+namespace afterglow::hash_cache {
+
+struct CachingSettings {
+  WalkSettings walk;
+  uint32_t store = 3;        // diffuse vertices of a path that keep a sample, the asking point included (l_store)
+  uint32_t length = 0;       // further vertices whose light each of them gets (l_len); 0: as the bounce limits say
+  float cell_pixels = 4.0f;  // width of the finest cells in pixels
+  bool operator==(const CachingSettings& o) const;
+};
+
+/// Paths from all points, each a function of its point and of `seed` alone: samples in the order of the points.
+/// Nothing, when stopped.
+std::vector<Sample> cache_paths(const WalkScene&, const Grid&, const CachingSettings&,
+                                std::span<const CachePoint> points, uint32_t seed, const Work&, RayCounts&);
+
+/// A number of its own for every question of an image.
+inline uint32_t hash_of(const CachePoint& p, uint32_t seed) {
+  return hash(uint32_t(p.x) | uint32_t(p.y) << 16, uint32_t(p.layer) * 2u + p.translucent, seed);
+}
+
+}  // namespace afterglow::hash_cache

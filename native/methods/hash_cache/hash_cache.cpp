@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// HashCache as a method: its settings and statistics. See hash_cache.h.
+#include "methods/hash_cache/hash_cache.h"
+
+#include "methods/hash_cache/cache.h"
+
+namespace afterglow::hash_cache {
+
+namespace {
+
+constexpr const char* kViews[] = {"LIGHT", "LEVEL", "COUNT", "AGE", "SIDE"};
+
+class HashCache final : public IndirectMethod {
+ public:
+  MethodTraits traits() const override { return {}; }
+
+  void configure(const Settings& settings) override {
+    CacheSettings s;
+    s.caching.walk.configure(settings);
+    for (const auto& [name, value] : settings) {
+      if (name == "hash_store") s.caching.store = uint32_t(integer_of(value));
+      if (name == "hash_length") s.caching.length = uint32_t(integer_of(value));
+      if (name == "hash_cell") s.caching.cell_pixels = float(number_of(value));
+      if (name == "hash_resolution") s.resolution = float(number_of(value) * number_of(value));
+      if (name == "hash_jitter") s.jitter = float(number_of(value));
+      if (name == "hash_trusted") s.trusted = float(number_of(value));
+      if (name == "hash_keep") s.keep = uint32_t(integer_of(value));
+      if (name == "hash_memory") s.limit = size_t(number_of(value) * 1048576.0);
+      if (name == "hash_view")
+        for (int i = 0; i < 5; ++i)
+          if (const auto* text = std::get_if<std::string>(&value); text && *text == kViews[i]) s.view = View(i);
+    }
+    cache_.configure(s);
+  }
+
+  void update(const CommittedScene& scene, const SceneChanges& changes, Work& work) override {
+    cache_.update(scene, changes, work);
+  }
+  bool refine(const CommittedScene&, Work&) override { return false; }
+  void prepare(const CommittedScene& scene, std::span<const CachePoint> points, Work& work) override {
+    cache_.fill(scene, points, work);
+  }
+  void gather(const CommittedScene&, std::span<const CachePoint> points, std::span<Answer> answers) const override {
+    for (size_t i = 0; i < points.size(); ++i) answers[i] = cache_.answer(points[i]);
+  }
+  void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&) override {}
+
+  MethodStatistics statistics() const override {
+    const CacheCounts& c = cache_.counts();
+    const TableCounts& t = cache_.table().counts();
+    return {{{"cells", double(cache_.table().size())},
+             {"cells_new", double(t.added)},
+             {"cells_evicted", double(t.evicted)},
+             {"cells_refused", double(t.refused)},
+             {"cells_updated", double(c.cells)},
+             {"cache_samples", double(c.samples)},
+             {"cache_paths", double(c.paths)},
+             {"cache_holes", double(c.holes)},
+             {"cache_rays", double(c.rays)},
+             {"cache_shadow_rays", double(c.shadow_rays)},
+             {"cache_dropped", double(c.dropped)},
+             {"cache_resets", double(c.resets)},
+             {"cache_bytes", double(cache_.table().bytes())},
+             {"seconds_paths", c.seconds_paths},
+             {"seconds_table", c.seconds_table}}};
+  }
+
+ private:
+  Cache cache_;
+};
+
+}  // namespace
+
+MethodDescription describe() {
+  MethodDescription d;
+  d.id = "HASH_CACHE";
+  d.label = "HashCache";
+  d.description = "Bounced light kept in a hierarchy of small cells: what one frame found, all that follow see";
+  const auto add = [&](const char* name, const char* label, const char* text, const char* unit, SettingValue value,
+                       double min, double max) {
+    d.settings.push_back({name, label, text, unit, value, min, max});
+  };
+  add("hash_cell", "Cell Size", "Width of the finest cells: smaller, sharper and noisier", "pixels", 4.0, 0.25, 256.0);
+  add("hash_store", "Stored Surfaces", "Diffuse surfaces of a path that keep a sample", "", int64_t(3), 1.0, 16.0);
+  add("hash_length", "Path Length", "Further surfaces whose light each of them gets; 0: as the bounce limits say", "",
+      int64_t(0), 0.0, 1024.0);
+  add("hash_resolution", "Caching Resolution",
+      "Paths that fill the cache, as a share of the image's width and height; what no cell answers is filled anyway",
+      "", 1.0, 0.0, 1.0);
+  add("hash_jitter", "Jitter", "How far look-ups are scattered along the surface, so that cells do not show", "cells",
+      0.5, 0.0, 4.0);
+  add("hash_trusted", "Trusted Samples", "Samples from which on a cell answers alone; below, larger ones help", "",
+      32.0, 1.0, 1e6);
+  add("hash_keep", "Keep at Edits",
+      "Samples that a cell keeps when the scene changes, so that the image stays useful while it heals; 0: none", "",
+      int64_t(0), 0.0, 1e6);
+  add("hash_memory", "Memory", "Most memory for cells; beyond, those without new samples for longest make room", "MiB",
+      1024.0, 1.0, 1e6);
+  add("hash_view", "View", "LIGHT, or what the cells hold: LEVEL, COUNT, AGE, SIDE", "", std::string("LIGHT"), 0.0,
+      0.0);
+  d.debug_views = {"LEVEL", "COUNT", "AGE", "SIDE"};
+  d.statistics = {"cells",         "cells_new",    "cells_evicted", "cells_refused", "cells_updated",
+                  "cache_samples", "cache_paths",  "cache_holes",   "cache_rays",    "cache_shadow_rays",
+                  "cache_dropped", "cache_resets", "cache_bytes",   "seconds_paths", "seconds_table"};
+  return d;
+}
+
+std::unique_ptr<IndirectMethod> make() { return std::make_unique<HashCache>(); }
+
+}  // namespace afterglow::hash_cache

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""HashCache against the path tracer; what must not change the picture; what the cells remember and forget."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import afterglow
+import numpy as np
+import pytest
+from afterglow.scenes import Camera, Description, Light, look_at, node, translate
+from afterglow.scenes.native import Built, graph
+from afterglow.scenes.rooms import cornell_box, diffuse, emission, furnace, sealed_box
+from afterglow.scenes.shapes import quad
+from hard_cases import Mean, agree, render
+
+HASH: dict[str, Any] = dict(method="HASH_CACHE")
+
+
+def indirect(scene: Any, repeats: int, **settings: Any) -> Mean:
+    """Mean of the diffuse indirect light over independent seeds, each with a cache of its own, and its standard error."""
+    defaults = dict(size=16, caustics_reflective=False, caustics_refractive=False, passes=["diffuse_indirect"])
+    values = [float(render(scene, seed=50 + i, **{**defaults, **settings}).passes["diffuse_indirect"].mean(dtype=np.float64))
+              for i in range(repeats)]
+    return Mean(float(np.mean(values)), float(np.std(values, ddof=1) / repeats**0.5))
+
+
+class Live:
+    """A scene and a session whose cache stays alive."""
+
+    def __init__(self, description: Description, **settings: Any) -> None:
+        self.built = Built(description)
+        self.settings = {**HASH, "width": 32, "height": 32, "samples": 2, "diffuse_bounces": 4, "passes": ["combined", "diffuse_indirect"],
+                         **settings}
+        self.built.set_camera((self.settings["width"], self.settings["height"]), 0)
+        self.built.scene.commit()
+        self.session = afterglow.Session(self.built.scene, self.settings)
+        self.run()
+
+    def run(self, **settings: Any) -> np.ndarray:
+        self.session.update(settings)
+        self.session.start()
+        self.session.wait()
+        return self.session.read("diffuse_indirect")
+
+    def edit(self, change: Any) -> np.ndarray:
+        with self.session.edit():
+            change()
+            self.built.scene.commit()
+        self.session.wait()
+        return self.session.read("diffuse_indirect")
+
+    def look_from(self, eye: tuple[float, float, float], at: tuple[float, float, float]) -> np.ndarray:
+        def walk() -> None:
+            self.built.description.camera.transform = look_at(eye, at)
+            self.built.set_camera((self.settings["width"], self.settings["height"]), 0)
+
+        return self.edit(walk)
+
+    def number(self, name: str) -> float:
+        return float(self.session.statistics()["values"][name])
+
+
+@pytest.mark.parametrize("albedo", [0.3, 0.8])
+def test_furnace(albedo: float) -> None:
+    """Radiance e (1 + a + … + a^(n+1)), as the path tracer's bounce limit has it."""
+    expected = sum((1 - albedo) * albedo**k for k in range(6))
+    values = [float(render(furnace(albedo), size=12, samples=16, seed=i, diffuse_bounces=4, **HASH).image[..., :3].mean(dtype=np.float64))
+              for i in range(6)]
+    error = float(np.std(values, ddof=1) / len(values) ** 0.5)
+    assert abs(np.mean(values) - expected) < 4.5 * error + 1e-4
+
+
+@pytest.mark.parametrize("bounces", [0, 1, 4])
+def test_cornell_box_has_the_path_tracers_bounces(bounces: int) -> None:
+    scene = cornell_box()
+    truth = indirect(scene, 4, method="PATH_TRACING", samples=128, diffuse_bounces=bounces)
+    found = indirect(scene, 6, samples=32, diffuse_bounces=bounces, **HASH)
+    agree(found, truth, tolerance=0.005)
+
+
+@pytest.mark.parametrize("variant", ["emissive", "glossy", "mirror", "textured"])
+def test_rooms_have_the_path_tracers_light(variant: str) -> None:
+    scene = cornell_box(variant)
+    settings = dict(size=16, caustics_reflective=False, caustics_refractive=False, diffuse_bounces=4)
+    truth = [render(scene, method="PATH_TRACING", samples=128, seed=i, **settings).image[..., :3].mean(dtype=np.float64) for i in range(4)]
+    found = [render(scene, samples=32, seed=i, **HASH, **settings).image[..., :3].mean(dtype=np.float64) for i in range(4)]
+    means = [Mean(float(np.mean(v)), float(np.std(v, ddof=1) / 2)) for v in (found, truth)]
+    agree(means[0], means[1], tolerance=0.01)
+
+
+def test_path_length_is_a_bounce_limit_and_stored_surfaces_change_no_mean() -> None:
+    scene = cornell_box()
+    short = indirect(scene, 6, samples=32, diffuse_bounces=4, hash_length=1, **HASH)
+    agree(short, indirect(scene, 4, method="PATH_TRACING", samples=128, diffuse_bounces=1), tolerance=0.005)
+    truth = indirect(scene, 4, method="PATH_TRACING", samples=128, diffuse_bounces=4)
+    for store in (1, 8):
+        agree(indirect(scene, 6, samples=32, diffuse_bounces=4, hash_store=store, **HASH), truth, tolerance=0.01)
+
+
+def test_pixels_converge_and_much_sooner_than_paths() -> None:
+    scene = cornell_box()
+    settings = dict(size=32, diffuse_bounces=4, passes=["diffuse_indirect"], seed=3)
+    truth = render(scene, method="PATH_TRACING", samples=2048, **{**settings, "seed": 77}).passes["diffuse_indirect"]
+
+    def error(samples: int, **more: Any) -> float:
+        image = render(scene, samples=samples, **settings, **more).passes["diffuse_indirect"]
+        return float(((image - truth) ** 2).mean() / (truth**2).mean())
+
+    cached = [error(n, hash_cell=2.0, **HASH) for n in (1, 8, 64)]
+    assert cached[0] > 2.0 * cached[1] > 4.0 * cached[2]
+    assert cached[1] < 0.25 * error(8, method="PATH_TRACING")
+
+
+@pytest.mark.parametrize("variant", ["diffuse", "glossy", "glass"])
+def test_any_number_of_threads(variant: str) -> None:
+    one, two, three = (render(cornell_box(variant), size=32, samples=3, threads=n, seed=5, **HASH).image for n in (1, 2, 3))
+    assert np.array_equal(one, two) and np.array_equal(one, three)
+
+
+def test_fewer_paths_than_pixels_leave_no_holes() -> None:
+    scene = cornell_box()
+    truth = indirect(scene, 4, method="PATH_TRACING", samples=128, diffuse_bounces=4)
+    found = indirect(scene, 6, samples=64, diffuse_bounces=4, hash_resolution=0.5, **HASH)
+    agree(found, truth, tolerance=0.02)
+    dark = render(cornell_box(), samples=1, passes=["diffuse_indirect"], hash_resolution=0.0, **HASH)
+    assert (dark.passes["diffuse_indirect"].max(-1) > 0).mean() > 0.9
+
+
+def test_the_second_frame_profits_from_the_first() -> None:
+    live = Live(cornell_box(), hash_cell=2.0)
+    truth = render(cornell_box(), size=32, samples=1024, diffuse_bounces=4, passes=["diffuse_indirect"]).passes["diffuse_indirect"]
+    errors = [float(((live.run(seed=i, samples=2) - truth) ** 2).mean()) for i in range(6)]
+    assert errors[5] < 0.5 * errors[0]
+    assert live.number("cache_resets") == 1
+
+
+def test_a_walk_of_the_camera_keeps_the_cells() -> None:
+    live = Live(cornell_box())
+    cells = live.number("cells")
+    live.look_from((0.1, -3.5, 1.0), (0, 0, 1.0))
+    assert live.number("cache_resets") == 1 and live.number("cells") >= cells
+
+
+def test_edits_forget_what_was() -> None:
+    live = Live(cornell_box())
+    lamp = live.built.lights["Lamp"]
+    bright = live.session.read("diffuse_indirect").mean()
+    dark = live.edit(lambda: live.built.scene.set_light(lamp, power=0.0))
+    assert dark.max() == 0.0 and live.number("cache_resets") == 2
+    red = live.edit(lambda: live.built.scene.set_light(lamp, power=25.0))
+    assert abs(red.mean() / bright - 1) < 0.2
+    live.edit(lambda: live.built.scene.set_material(live.built.materials["red"], graph(diffuse((0.1, 0.2, 0.9)))))
+    assert live.number("cache_resets") == 4
+
+
+def test_cells_that_are_kept_heal() -> None:
+    live = Live(cornell_box(), hash_keep=4, samples=4)
+    before = live.session.read("diffuse_indirect").mean()
+    live.edit(lambda: live.built.scene.set_light(live.built.lights["Lamp"], power=12.5))
+    assert live.number("cache_resets") == 1
+    for _ in range(8):
+        after = live.run(samples=8).mean()
+    assert abs(after / before - 0.5) < 0.05
+
+
+def test_memory_has_a_limit() -> None:
+    live = Live(cornell_box(), width=96, height=96, samples=1, hash_cell=0.25, hash_memory=1.0)
+    assert live.number("cache_bytes") < 1.1 * 2**20
+    assert live.number("cells_refused") > 0
+    truth = render(cornell_box(), size=32, samples=64, passes=["diffuse_indirect"], diffuse_bounces=4).passes["diffuse_indirect"].mean()
+    assert abs(live.session.read("diffuse_indirect").mean() / truth - 1) < 0.2
+
+
+def test_two_sheets_lit_from_one_side() -> None:
+    """A tenth of a millimetre apart: what shines on the upper one's top is in no other side's cells."""
+    scene = Description("sheets", Camera(look_at((0, -1.0, -1.5), (0, 0, 0)), math.radians(40)))
+    scene.materials.update(paper=diffuse((0.8, 0.8, 0.8)), lamp=emission(20.0))
+    for name, z in (("Lower", 0.0), ("Upper", 1e-4)):
+        scene.add(name, quad((-2, -2, z), (2, -2, z), (2, 2, z), (-2, 2, z)), "paper")
+    scene.add("Ceiling", quad((-2, -2, 1.5), (-2, 2, 1.5), (2, 2, 1.5), (2, -2, 1.5)), "paper")
+    scene.lights = [Light("L", "point", translate((0, 0, 0.7)), 200.0)]
+    truth = render(scene, size=16, method="PATH_TRACING", samples=256, diffuse_bounces=4).image[..., :3].mean()
+    assert abs(render(scene, size=16, samples=16, diffuse_bounces=4, **HASH).image[..., :3].mean() - truth) <= 0.05 * truth + 1e-6
+
+
+def test_sealed_box_stays_black() -> None:
+    assert render(sealed_box(), size=16, samples=2, **HASH).image[..., :3].max() == 0.0
+
+
+def test_light_of_a_million_and_a_millionth() -> None:
+    """No half floats: brightness changes nothing but itself."""
+    images = [render(furnace(0.8, radiance), size=8, samples=8, seed=1, diffuse_bounces=4, **HASH).image[..., :3] / radiance
+              for radiance in (1.0, 2.0**20, 2.0**-20)]
+    assert np.allclose(images[1], images[0], rtol=1e-5) and np.allclose(images[2], images[0], rtol=1e-5)
+
+
+def test_translucent_surfaces() -> None:
+    scene = Description("cloth", Camera(look_at((0, -3, 0.5), (0, 0, 0.8)), math.radians(50)))
+    scene.materials.update(cloth=node("translucent_bsdf", color=(0.8, 0.8, 0.8)), white=diffuse((0.7, 0.7, 0.7)))
+    scene.add("Floor", quad((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)), "white")
+    scene.add("Cloth", quad((-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)), "cloth")
+    scene.lights = [Light("L", "area", look_at((0, 0, 2), (0, 0, 0), (0, 1, 0)), 50.0, size=(0.5, 0.5))]
+    truth = indirect(scene, 4, method="PATH_TRACING", samples=256)
+    agree(indirect(scene, 6, samples=32, **HASH), truth, tolerance=0.02)
+
+
+def test_nothing_to_light_and_nothing_to_light_it() -> None:
+    empty = Description("empty", Camera(look_at((0, -2, 0), (0, 0, 0))))
+    assert render(empty, size=8, samples=2, **HASH).image[..., :3].max() == 0.0
+
+
+@pytest.mark.parametrize("view", ["LEVEL", "COUNT", "AGE", "SIDE"])
+def test_debug_views_show_something(view: str) -> None:
+    shown = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], hash_view=view, **HASH).passes["diffuse_indirect"]
+    light = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], **HASH).passes["diffuse_indirect"]
+    assert shown.max() > 0 and not np.allclose(shown, light)
+
+
+def test_settings_are_described() -> None:
+    described = {m["id"]: m for m in afterglow.method_descriptions()}["HASH_CACHE"]
+    assert {"hash_cell", "hash_store", "hash_length", "hash_memory"} <= {s["name"] for s in described["settings"]}
