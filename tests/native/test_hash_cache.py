@@ -124,15 +124,17 @@ def test_fewer_paths_than_pixels_leave_no_holes() -> None:
     truth = indirect(scene, 4, method="PATH_TRACING", samples=128, diffuse_bounces=4)
     found = indirect(scene, 6, samples=64, diffuse_bounces=4, hash_resolution=0.5, **HASH)
     agree(found, truth, tolerance=0.02)
-    dark = render(cornell_box(), samples=1, passes=["diffuse_indirect"], hash_resolution=0.0, **HASH)
-    assert (dark.passes["diffuse_indirect"].max(-1) > 0).mean() > 0.9
+    bare = render(furnace(0.8), size=16, samples=1, passes=["diffuse_indirect"], hash_resolution=0.0, **HASH)
+    assert bare.passes["diffuse_indirect"].min() > 0.0  # nothing but holes, and each was filled
+    assert bare.statistics["values"]["cache_holes"] == bare.statistics["values"]["cache_paths"] > 0
 
 
 def test_the_second_frame_profits_from_the_first() -> None:
     live = Live(cornell_box(), hash_cell=2.0)
     truth = render(cornell_box(), size=32, samples=1024, diffuse_bounces=4, passes=["diffuse_indirect"]).passes["diffuse_indirect"]
-    errors = [float(((live.run(seed=i, samples=2) - truth) ** 2).mean()) for i in range(6)]
-    assert errors[5] < 0.5 * errors[0]
+    # The median: at edges the two samples of a pixel decide, whatever the cache knows.
+    errors = [float(np.median((live.run(seed=i, samples=2) - truth) ** 2)) for i in range(12)]
+    assert errors[11] < 0.5 * errors[0]
     assert live.number("cache_resets") == 1
 
 

@@ -65,9 +65,9 @@ void Table::Part::resize(size_t count) {
     if (r.key) slot(r.key) = r;
 }
 
-void Table::Part::reserve(size_t more) {
+void Table::Part::reserve(size_t more, size_t most) {
   const size_t needed = (used + more) * kOf / kFullest + 2;
-  if (needed > slots.size()) resize(std::max(needed, slots.size() + slots.size() / 2));
+  if (needed > slots.size()) resize(std::max(needed, std::min(most, slots.size() + slots.size() / 2)));
 }
 
 void Table::Part::drop_older(uint32_t age, uint32_t stamp) {
@@ -115,7 +115,7 @@ void Table::reduce(std::span<const Sample> samples, std::span<const KeyIndex> or
   }
   make_room(part, fresh, stamp, out.counts);
   const size_t most = part_limit() * kFullest / kOf;
-  part.reserve(std::min(fresh, most - std::min(most, part.used)));
+  part.reserve(std::min(fresh, most - std::min(most, part.used)), part_limit());
   if (part.slots.empty()) {
     out.counts.refused += keys.size();
     return;
@@ -205,7 +205,7 @@ void Table::restore(std::span<const Record> records) {
   std::array<size_t, kParts> counts{};
   for (const Record& r : records) counts[r.key >> 56]++;
   for (uint32_t p = 0; p < kParts; ++p)
-    if (counts[p]) parts_[p].reserve(counts[p]);
+    if (counts[p]) parts_[p].reserve(counts[p], counts[p]);
   for (const Record& r : records) {
     Part& part = parts_[r.key >> 56];
     part.slot(r.key) = r;

@@ -77,7 +77,7 @@ class Table {
     size_t home(uint64_t key) const { return size_t(uint64_t(uint32_t(key >> 24)) * slots.size() >> 32); }
     Record& slot(uint64_t key);
     void resize(size_t slots);
-    void reserve(size_t more);
+    void reserve(size_t more, size_t most);  // most: slots, unless more are needed
     void drop_older(uint32_t age, uint32_t stamp);
   };
   struct Reduced {
