@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "base/sampler.h"
 #include "lights/camera.h"
+#include "methods/hash_cache/occupied.h"
 #include "module/queries.h"
 #include "rays/measure_rays.h"
 #include "rays/surface_point.h"
@@ -306,6 +307,39 @@ py::array_t<float> sobol_points(py::ssize_t count, py::ssize_t dimensions, uint3
   return out;
 }
 
+/// The structure of the HashCache's paper over a scene, and which of the points lie in occupied cells.
+py::dict occupied_cells(const PyScene& self, int levels, const py::handle& points, unsigned threads) {
+  if (levels < 0 || levels > hash_cache::Occupied::kFinest)
+    throw InvalidInput("occupied_cells: levels must be from 0 to " + std::to_string(hash_cache::Occupied::kFinest));
+  const Points at = numbers<double>(points, "points", 3);
+  const auto n = py::ssize_t(at.shape(0));
+  py::array_t<int64_t> index({py::ssize_t(levels) + 1, n});
+  int64_t* to = index.mutable_data();
+  hash_cache::Occupied occupied;
+  {
+    const py::gil_scoped_release free;
+    const auto lock = reading(self);
+    const Scene& scene = self.core->scene;
+    occupied.build(scene, levels, threads);
+    for (int level = 0; level <= levels; ++level)
+      for (py::ssize_t i = 0; i < n; ++i) {
+        const uint32_t found = occupied.index(relative(at.data() + 3 * i, scene.origin()), level);
+        *to++ = found == kNone ? -1 : int64_t(found);
+      }
+  }
+  py::list cells, blocks, map_bytes;
+  for (const hash_cache::OccupiedLevel& level : occupied.levels()) {
+    cells.append(level.cells());
+    blocks.append(level.blocks());
+    map_bytes.append(level.bytes());
+  }
+  py::dict out;
+  out["cells"] = cells, out["blocks"] = blocks, out["map_bytes"] = map_bytes, out["index"] = index;
+  out["peak_bytes"] = occupied.peak_bytes();
+  out["seconds_mark"] = occupied.seconds_mark(), out["seconds_maps"] = occupied.seconds_maps();
+  return out;
+}
+
 }  // namespace
 
 void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>& scene) {
@@ -324,6 +358,8 @@ void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>&
       .def_property_readonly("bytes", &bytes);
   m.def("measure_rays", &measure, py::arg("scene"), py::arg("origins"), py::arg("directions"),
         py::arg("kind") = "closest", py::arg("rounds") = 8);
+  m.def("occupied_cells", &occupied_cells, py::arg("scene"), py::arg("levels"), py::arg("points") = py::list(),
+        py::arg("threads") = 0);
   m.def("versions", &versions);
   m.def("set_log", &set_log, py::arg("sink"));
   m.def("sobol", &sobol_points, py::arg("count"), py::arg("dimensions"), py::arg("seed"));

@@ -260,4 +260,7 @@ def measure_rays(scene: Scene, origins: NDArray[np.float64], directions: NDArray
                  rounds: int = 8) -> dict[str, Any]:
     """Seconds of all rays on one thread, through native/rays (wrapped) and by bare Embree calls (bare), in alternating
     pairs. kind "closest", or "occluded": then directions are targets."""
+def occupied_cells(scene: Scene, levels: int, points: NDArray[np.float64] = ..., threads: int = 0) -> dict[str, Any]:
+    """Cells that hold geometry, on grids of 1 to 2^levels (at most 12) cells each way: cells, blocks and map_bytes a level,
+    seconds_mark, seconds_maps, peak_bytes; index (levels + 1, N): each point's cell's data on each level, -1 where empty."""
 def sobol(count: int, dimensions: int, seed: int) -> NDArray[np.float32]: ...
