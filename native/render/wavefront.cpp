@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "film/discontinuity.h"
+#include "film/layered_filter.h"
 #include "render/wavefront_kernel.h"
 
 namespace afterglow {
@@ -100,20 +101,31 @@ void answer(IndirectMethod& method, const CommittedScene& scene, Wavefront& wave
   gather(method, scene, wave.points, wave.answers, work);  // what was answered before may have a nearer record now
 }
 
-/// Shares answers between the first diffuse surfaces of neighbouring pixels.
-void share(std::span<const PixelRequest> requests, uint32_t interleave, Wavefront& wave, const Work& work,
-           WavefrontTimes& times) {
-  const Stopwatch watch(times.filter);
+/// The pixels of a wavefront, in steps of their pass.
+struct PixelBox {
+  uint32_t x0 = 0, y0 = 0, width = 0, height = 0;
+  size_t index(const CachePoint& p) const { return size_t(p.y - y0) * width + (p.x - x0); }
+};
+
+PixelBox pixels_of(std::span<const PixelRequest> requests) {
   uint32_t x0 = ~0u, y0 = ~0u, x1 = 0, y1 = 0;
   for (const PixelRequest& r : requests) {
     x0 = std::min<uint32_t>(x0, r.x / r.step), y0 = std::min<uint32_t>(y0, r.y / r.step);
     x1 = std::max<uint32_t>(x1, (r.x + r.width - 1u) / r.step + 1u);
     y1 = std::max<uint32_t>(y1, (r.y + r.height - 1u) / r.step + 1u);
   }
-  const uint32_t width = x1 - x0, height = y1 - y0;
+  return {x0, y0, x1 - x0, y1 - y0};
+}
+
+/// Shares answers between the first diffuse surfaces of neighbouring pixels.
+void share(std::span<const PixelRequest> requests, uint32_t interleave, Wavefront& wave, const Work& work,
+           WavefrontTimes& times) {
+  const Stopwatch watch(times.filter);
+  const PixelBox box = pixels_of(requests);
+  const uint32_t width = box.width, height = box.height;
   std::vector<SharedIrradiance> grid(size_t(width) * height);
   std::vector<Rgb> shared(grid.size());
-  const auto at = [&](const CachePoint& p) { return size_t(p.y - y0) * width + (p.x - x0); };
+  const auto at = [&](const CachePoint& p) { return box.index(p); };
   const auto takes_part = [](const CachePoint& p) { return p.layer == 0 && !p.translucent; };
   for (size_t i = 0; i < wave.points.size(); ++i) {
     const CachePoint& p = wave.points[i];
@@ -123,6 +135,34 @@ void share(std::span<const PixelRequest> requests, uint32_t interleave, Wavefron
   if (work.stop.stop()) return;
   for (size_t i = 0; i < wave.points.size(); ++i)
     if (takes_part(wave.points[i])) wave.answers[i].light = shared[at(wave.points[i])];
+}
+
+/// Filters what was answered, surface after surface along the paths, each sample of the picture by itself.
+void filter_layers(std::span<const PixelRequest> requests, Wavefront& wave, const Work& work, WavefrontTimes& times) {
+  const Stopwatch watch(times.filter);
+  const PixelBox box = pixels_of(requests);
+  uint32_t layers = 0;
+  const auto layer_of = [](const CachePoint& p) { return 2u * p.layer + p.translucent; };
+  for (const CachePoint& p : wave.points) layers = std::max(layers, layer_of(p) + 1);
+  std::vector<LayerPixel> grid(size_t(box.width) * box.height);
+  std::vector<Rgb> filtered(grid.size());
+  for (uint32_t layer = 0; layer < layers && !work.stop.stop(); ++layer) {
+    std::fill(grid.begin(), grid.end(), LayerPixel{});
+    size_t present = 0;
+    for (size_t i = 0; i < wave.points.size(); ++i) {
+      const CachePoint& p = wave.points[i];
+      const Answer& a = wave.answers[i];
+      if (layer_of(p) != layer) continue;
+      present++;
+      grid[box.index(p)] = {p.position,       p.normal, p.footprint, p.segment,
+                            a.relative_error, a.light,  true,        !(a.weight > 0.0f)};
+    }
+    if (!present) continue;
+    filter_layer(grid, box.width, box.height, filtered, work.threads, work.stop);
+    if (work.stop.stop()) return;
+    for (size_t i = 0; i < wave.points.size(); ++i)
+      if (layer_of(wave.points[i]) == layer) wave.answers[i].light = filtered[box.index(wave.points[i])];
+  }
 }
 
 void join(const FilmLayout& layout, const WalkSettings& settings, const Question& q, const Answer& answer, float* sums,
@@ -197,7 +237,9 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
   const WalkKernel kernel = choose_walk_kernel(scene.effects, film.settings().passes, work.shown);
   const uint32_t interleave = method.traits().interleave;
   std::vector<PixelRequest> requests(all.begin(), all.end());
-  if (interleave > 1) {  // neighbours share what they found for the same sample
+  const bool layers = method.traits().layers;
+  const bool apart = interleave > 1 || layers;
+  if (apart) {  // neighbours share what they found for the same sample
     requests.clear();
     uint32_t most = 0;
     for (const PixelRequest& r : all) most = std::max(most, r.count);
@@ -210,7 +252,7 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
     uint64_t samples = 0;
     do samples += sample_count(requests[end++]);
     while (end < requests.size() && samples + sample_count(requests[end]) <= kMostSamples &&
-           (interleave == 1 || requests[end].first == requests[begin].first));
+           (!apart || requests[end].first == requests[begin].first));
     const std::span<const PixelRequest> part(requests.data() + begin, end - begin);
     begin = end;
     Wavefront wave;
@@ -219,6 +261,7 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
     answer(method, scene, wave, work, times);
     if (work.stop.stop()) return;
     if (interleave > 1) share(part, interleave, wave, work, times);
+    if (layers) filter_layers(part, wave, work, times);
     if (work.stop.stop()) return;
     finish(part, film, wave, settings, work, times);
   }

@@ -12,10 +12,11 @@ constexpr const char* kViews[] = {"LIGHT", "LEVEL", "COUNT", "AGE", "SIDE"};
 
 class HashCache final : public IndirectMethod {
  public:
-  MethodTraits traits() const override { return {}; }
+  MethodTraits traits() const override { return {.layers = filter_}; }
 
   void configure(const Settings& settings) override {
     CacheSettings s;
+    filter_ = true;
     s.caching.walk.configure(settings);
     for (const auto& [name, value] : settings) {
       if (name == "hash_store") s.caching.store = uint32_t(integer_of(value));
@@ -26,6 +27,7 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_trusted") s.trusted = float(number_of(value));
       if (name == "hash_keep") s.keep = uint32_t(integer_of(value));
       if (name == "hash_memory") s.limit = size_t(number_of(value) * 1048576.0);
+      if (name == "hash_filter") filter_ = integer_of(value) != 0;
       if (name == "hash_view")
         for (int i = 0; i < 5; ++i)
           if (const auto* text = std::get_if<std::string>(&value); text && *text == kViews[i]) s.view = View(i);
@@ -67,6 +69,7 @@ class HashCache final : public IndirectMethod {
 
  private:
   Cache cache_;
+  bool filter_ = true;
 };
 
 }  // namespace
@@ -91,6 +94,8 @@ MethodDescription describe() {
       0.5, 0.0, 4.0);
   add("hash_trusted", "Trusted Samples", "Samples from which on a cell answers alone; below, larger ones help", "",
       32.0, 1.0, 1e6);
+  add("hash_filter", "Layered Filter", "Smooths light between neighbouring pixels while cells hold few samples", "",
+      true, 0.0, 1.0);
   add("hash_keep", "Keep at Edits",
       "Samples that a cell keeps when the scene changes, so that the image stays useful while it heals; 0: none", "",
       int64_t(0), 0.0, 1e6);

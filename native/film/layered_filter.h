@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A cross-bilateral filter for one layer of a picture: the diffuse surfaces that paths met at the same number of
+// surfaces from the camera (Roth et al. 2020, 3.4). It filters irradiance before albedo and throughput are applied,
+// each layer by itself, so that what a mirror shows keeps its own edges and is never tinted by the mirror's other
+// lobes.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/cancel.h"
+#include "base/math.h"
+
+namespace afterglow {
+
+struct LayerPixel {
+  Vec3 position{0.0f}, normal{0.0f};
+  float footprint = 0.0f;  // of a pixel on the surface
+  float segment = 0.0f;    // length of the last ray
+  float error = 0.0f;      // relative, as whoever answered believes; 0: exact, to be left alone
+  Rgb light{0.0f};
+  bool present = false;  // a surface is there
+  bool hole = false;     // but nothing answered for it
+};
+
+/// Edge-stopping functions, all from 0 to 1 and without units.
+float normal_stop(const Vec3& a, const Vec3& b);                          // (2)
+float plane_stop(const LayerPixel& a, const LayerPixel& b, float reach);  // (3), by the distance from the plane
+float segment_stop(float a, float b);                                     // (4), relative
+float luminance_stop(const Rgb& a, const Rgb& b, float error);            // (6), relative to what is believed
+
+/// Three passes of a 5 × 5 kernel whose taps spread by 1, 2 and 4 pixels (Dammertz et al. 2010). Holes take the mean of
+/// what surrounds them on their surface. Pixels that are exact stay as they are. The same on any number of threads.
+void filter_layer(std::span<const LayerPixel> in, uint32_t width, uint32_t height, std::span<Rgb> out,
+                  unsigned threads = 0, StopToken stop = {});
+
+}  // namespace afterglow
