@@ -88,6 +88,10 @@ class IndirectMethod {
   /// Methods that claim kAllTerms render whole requests; the others never see this call.
   virtual void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&) = 0;
   virtual MethodStatistics statistics() const = 0;
+  /// What it remembers of this scene, as bytes for load(); empty: nothing.
+  virtual std::vector<char> save(const CommittedScene&) const { return {}; }
+  /// Takes the place of what it remembers; throws InvalidInput for bytes of another scene or of another kind.
+  virtual void load(const CommittedScene&, std::span<const char>) {}
 };
 
 const std::vector<MethodDescription>& method_descriptions();

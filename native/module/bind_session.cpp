@@ -272,6 +272,10 @@ void bind_session(py::module_& m) {
             s->update(values);
           },
           py::arg("settings"))
+      .def(
+          "save_cache", [](PySession& s, const std::string& path) { s->save_cache(path); }, py::arg("path"), Free())
+      .def(
+          "load_cache", [](PySession& s, const std::string& path) { s->load_cache(path); }, py::arg("path"), Free())
       .def("progress", &progress)
       .def("passes", [](PySession& s) { return pass_names(s->passes()); })
       .def("read", &read, py::arg("name") = "combined", py::arg("out") = py::none())

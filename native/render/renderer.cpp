@@ -2,6 +2,12 @@
 // Methods that serve every light term take requests as they are; for the others the camera's paths are walked here.
 #include "render/renderer.h"
 
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "base/errors.h"
+
 namespace afterglow {
 
 Renderer::Renderer(const std::string& method)
@@ -34,6 +40,30 @@ void Renderer::update(const CommittedScene& scene, Work& work) {
 void Renderer::render(const CommittedScene& scene, std::span<const PixelRequest> requests, Film& film, Work& work) {
   if (method_->traits().terms == kAllTerms) return method_->render(scene, requests, film, work);
   render_wavefronts(*method_, scene, requests, film, work, settings_, times_);
+}
+
+void Renderer::save(const CommittedScene& scene, const std::string& path) const {
+  const std::vector<char> bytes =
+      version_ == scene.scene.version() ? method_->save(scene) : std::vector<char>{};  // edits since then forget it
+  if (bytes.empty()) throw InvalidInput("method " + id_ + " remembers nothing of this scene that could be saved");
+  const std::string part = path + ".part";
+  std::ofstream file(part, std::ios::binary | std::ios::trunc);
+  file.write(bytes.data(), std::streamsize(bytes.size()));
+  file.close();
+  std::error_code failure;
+  if (file) std::filesystem::rename(part, path, failure);
+  if (!file || failure) {
+    std::remove(part.c_str());
+    throw FileError("the cache could not be written to '" + path + "'");
+  }
+}
+
+void Renderer::load(const CommittedScene& scene, const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::vector<char> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  if (!file && !file.eof()) throw FileError("the cache could not be read from '" + path + "'");
+  method_->load(scene, bytes);
+  version_ = scene.scene.version();
 }
 
 MethodStatistics Renderer::statistics() const {

@@ -27,6 +27,10 @@ class Renderer {
   void update(const CommittedScene&, Work&);
   void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&);
   MethodStatistics statistics() const;
+  /// What the method remembers, into and out of a file. Throw FileError, and InvalidInput where there is nothing to
+  /// save or the file belongs to another scene.
+  void save(const CommittedScene&, const std::string& path) const;
+  void load(const CommittedScene&, const std::string& path);
 
  private:
   std::string id_;

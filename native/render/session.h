@@ -60,6 +60,9 @@ class Session {
   void end_edit();
   void update(const NamedValues&);  // starts again when the image changes
   RenderSettings settings() const;
+  /// What the method remembers of the scene, into and out of a file; not while it renders (InvalidInput).
+  void save_cache(const std::string& path) const;
+  void load_cache(const std::string& path);
 
   SessionProgress progress() const;
   SessionStatistics statistics() const;
@@ -77,6 +80,7 @@ class Session {
   std::shared_ptr<const Image> shown() const;
 
  private:
+  void keep_cache(const std::string& path, bool load) const;
   void stop_thread();
   void launch();
   void run(RenderSettings);

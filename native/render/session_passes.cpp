@@ -2,6 +2,7 @@
 // What the session's thread does: whole passes by the schedule, pictures for readers, the denoiser.
 #include <bit>
 #include <chrono>
+#include <shared_mutex>
 
 #include "base/errors.h"
 #include "film/denoise_task.h"
@@ -27,6 +28,27 @@ InstanceMask local_view_mask(const Scene& scene, const std::vector<uint32_t>& ha
 }
 
 }  // namespace
+
+void Session::keep_cache(const std::string& path, bool load) const {
+  const std::lock_guard control(control_);
+  {
+    const std::lock_guard lock(mutex_);
+    if (state_ == SessionState::kRunning || state_ == SessionState::kPaused)
+      throw InvalidInput("a cache is saved and loaded while nothing renders: wait() or cancel() first");
+  }
+  const std::shared_lock lock(scene_->use);
+  std::unique_ptr<Renderer> renderer = Renderer::take(*scene_, settings_.method);
+  try {
+    load ? renderer->load(*scene_, path) : renderer->save(*scene_, path);
+  } catch (...) {
+    Renderer::leave(*scene_, std::move(renderer));
+    throw;
+  }
+  Renderer::leave(*scene_, std::move(renderer));
+}
+
+void Session::save_cache(const std::string& path) const { keep_cache(path, false); }
+void Session::load_cache(const std::string& path) { keep_cache(path, true); }
 
 void Session::render_passes(const RenderSettings& settings, Renderer& renderer, Film& film) {
   Work work{.stop = StopToken(&stop_),

@@ -212,6 +212,10 @@ class Session:
     def resume(self) -> None: ...
     def edit(self) -> Any: ...                          # context manager: stopped inside, restarted on leaving
     def update(self, settings: Mapping[str, Any]) -> None: ...   # changed settings; restarts when they change the image
+    def save_cache(self, path: str) -> None:
+        """What the method remembers of the scene, into a file; InvalidInput while it renders or where there is nothing."""
+    def load_cache(self, path: str) -> None:
+        """The same from a file, for the next start(); InvalidInput where the file is of another scene."""
     def progress(self) -> dict[str, Any]:
         """state "idle"|"running"|"paused"|"finished"|"cancelled"|"failed", fraction, samples, remaining (s, None unknown),
         elapsed, stage, error (believed relative error or None), generation (grows with every new readable result)"""

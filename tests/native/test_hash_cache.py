@@ -29,14 +29,15 @@ def indirect(scene: Any, repeats: int, **settings: Any) -> Mean:
 class Live:
     """A scene and a session whose cache stays alive."""
 
-    def __init__(self, description: Description, **settings: Any) -> None:
+    def __init__(self, description: Description, start: bool = True, **settings: Any) -> None:
         self.built = Built(description)
         self.settings = {**HASH, "width": 32, "height": 32, "samples": 2, "diffuse_bounces": 4, "passes": ["combined", "diffuse_indirect"],
                          **settings}
         self.built.set_camera((self.settings["width"], self.settings["height"]), 0)
         self.built.scene.commit()
         self.session = afterglow.Session(self.built.scene, self.settings)
-        self.run()
+        if start:
+            self.run()
 
     def run(self, **settings: Any) -> np.ndarray:
         self.session.update(settings)
@@ -218,6 +219,40 @@ def test_debug_views_show_something(view: str) -> None:
     shown = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], hash_view=view, **HASH).passes["diffuse_indirect"]
     light = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], **HASH).passes["diffuse_indirect"]
     assert shown.max() > 0 and not np.allclose(shown, light)
+
+
+def test_a_saved_cache_is_the_same_after_reload(tmp_path: Any) -> None:
+    first = Live(cornell_box())
+    path, again = str(tmp_path / "cells"), str(tmp_path / "again")
+    first.session.save_cache(path)
+    second = Live(cornell_box(), start=False)
+    second.session.load_cache(path)
+    second.session.save_cache(again)
+    assert open(path, "rb").read() == open(again, "rb").read()
+    assert np.array_equal(first.run(seed=7), second.run(seed=7))
+    assert second.number("cache_resets") == 0 and second.number("cells") == first.number("cells")
+
+
+def test_what_cannot_be_loaded_says_so(tmp_path: Any) -> None:
+    live = Live(cornell_box(), start=False)
+    path = tmp_path / "cells"
+    with pytest.raises(afterglow.InvalidInput, match="remembers nothing"):
+        live.session.save_cache(str(path))
+    with pytest.raises(afterglow.FileError):
+        live.session.load_cache(str(tmp_path / "nowhere" / "cells"))
+    live.run()
+    live.session.save_cache(str(path))
+    with pytest.raises(afterglow.FileError):
+        live.session.save_cache(str(tmp_path / "nowhere" / "cells"))
+    with pytest.raises(afterglow.InvalidInput, match="another scene"):
+        Live(furnace(0.5), start=False).session.load_cache(str(path))
+    whole = path.read_bytes()
+    for broken in (b"", whole[:100], whole[:-5], b"x" + whole[1:], whole[:-24] + bytes(24)):
+        path.write_bytes(broken)
+        with pytest.raises(afterglow.InvalidInput):
+            live.session.load_cache(str(path))
+    light = live.run(seed=3)
+    assert np.isfinite(light).all() and live.number("cache_resets") == 1  # nothing was lost
 
 
 def test_settings_are_described() -> None:

@@ -34,6 +34,8 @@ class Cache {
   /// One path from each chosen point, and from each that no cell could answer.
   void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
   Answer answer(const CachePoint&) const;
+  std::vector<char> save(const CommittedScene&) const;
+  void load(const CommittedScene&, std::span<const char>);
   const CacheCounts& counts() const { return counts_; }
   const Table& table() const { return table_; }
 

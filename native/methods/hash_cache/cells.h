@@ -59,6 +59,9 @@ class Grid {
     corner_ = (bounds.empty() ? Vec3(0.0f) : bounds.center()) -
               std::ldexp(finest_, kRadiusLevel) * Vec3(0.3137f, 0.2741f, 0.3459f);
   }
+  Grid(float finest, const Vec3& corner) : finest_(finest), corner_(corner) {}
+  float finest() const { return finest_; }
+  const Vec3& corner() const { return corner_; }
   float size(int level) const { return std::ldexp(finest_, level); }
   /// The level, with its fraction, whose cells have this size.
   float level(float size) const {

@@ -45,6 +45,8 @@ class HashCache final : public IndirectMethod {
   void gather(const CommittedScene&, std::span<const CachePoint> points, std::span<Answer> answers) const override {
     for (size_t i = 0; i < points.size(); ++i) answers[i] = cache_.answer(points[i]);
   }
+  std::vector<char> save(const CommittedScene& scene) const override { return cache_.save(scene); }
+  void load(const CommittedScene& scene, std::span<const char> bytes) override { cache_.load(scene, bytes); }
   void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&) override {}
 
   MethodStatistics statistics() const override {
