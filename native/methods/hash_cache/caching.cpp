@@ -15,6 +15,10 @@ namespace {
 constexpr uint32_t kMostStored = 16;
 constexpr float kMostLight = 1e30f;  // what is above is dropped and counted, as in the path tracer
 constexpr size_t kBlock = 128;
+/// Surfaces that a path meets later are met by other laws than the camera's: mixed into its cells they would pull the
+/// mean towards the part of a cell that faces other surfaces. They fill larger cells, which answer where nothing else
+/// does yet.
+constexpr int kFartherLevels = 2;
 
 /// A vertex of the path that keeps a sample, and how much of the light that is found now would arrive there.
 struct Stored {
@@ -168,6 +172,7 @@ void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<
     const int level = int(in.grid.level(p.footprint * in.settings.cell_pixels));
     for (const Stored& s : visitor.stored()) {
       if (!s.sampled) continue;
+      const int at = &s == visitor.stored().data() ? level : std::min(level + kFartherLevels, kTopLevel);
       const float sum = s.light.x + s.light.y + s.light.z;
       if (!(std::fabs(s.light.x) + std::fabs(s.light.y) + std::fabs(s.light.z) <= kMostLight)) {
         counts.dropped++;
@@ -175,7 +180,7 @@ void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<
       }
       const float limit = in.settings.walk.clamp_indirect;
       const Rgb light = glm::max(sum > limit ? s.light * (limit / sum) : s.light, Rgb(0.0f));
-      out.push_back({in.grid.cell(s.position, owner_of(s.instance, s.face_normal), level), light, 1});
+      out.push_back({in.grid.cell(s.position, owner_of(s.instance, s.face_normal), at), light, 1});
     }
   }
 }

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hard cases of the HashCache: sizes, places, needles, walls on borders of cells, lights that switch with every frame."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from afterglow.scenes import Camera, Description, Light, look_at, scale, translate
+from afterglow.scenes.native import Built
+from afterglow.scenes.rooms import cornell_box, diffuse, emission
+from afterglow.scenes.shapes import box, quad, sphere
+from hard_cases import agree, mean, render
+from test_hash_cache import Live
+
+HASH: dict[str, Any] = dict(method="HASH_CACHE", size=16, samples=16, diffuse_bounces=4, max_bounces=12)
+TRUE: dict[str, Any] = {**HASH, "method": "PATH_TRACING", "samples": 64}
+
+
+def room(transform: Any = None, power: float = 1.0) -> Description:
+    """A closed room with a lamp of its own and a ball."""
+    t = np.eye(4) if transform is None else np.asarray(transform)
+    scene = Description("room", Camera(t @ look_at((0, -0.8, 0), (0, 1, 0)), math.radians(80)))
+    scene.materials.update(white=diffuse((0.7, 0.7, 0.7)), lamp=emission(4.0 * power))
+    scene.add("Room", box((-1, -1, -1), (1, 1, 1), inward=True), "white", transform=t)
+    scene.add("Lamp", quad((-0.2, -0.2, 0.9), (-0.2, 0.2, 0.9), (0.2, 0.2, 0.9), (0.2, -0.2, 0.9)), "lamp", transform=t)
+    scene.add("Ball", sphere(0.3, 16, 8), "white", transform=t @ translate((0.3, 0.3, -0.6)))
+    return scene
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e4])
+def test_size_does_not_matter(size: float) -> None:
+    whole = scale((size,) * 3)
+    scaled = room(whole)
+    scaled.camera.transform = look_at((0, -0.8 * size, 0), (0, size, 0))
+    scaled.camera.clip = (0.01 * size, 1000.0 * size)
+    agree(mean(scaled, **HASH), mean(room(), **HASH), tolerance=0.005)
+
+
+def test_place_does_not_matter() -> None:
+    agree(mean(room(translate((1e5, -2e5, 3e4))), **HASH), mean(room(), **HASH), tolerance=0.005)
+
+
+def test_brightness_does_not_matter() -> None:
+    bright, plain = (render(room(power=p), seed=1, **HASH).image[..., :3] for p in (2.0**14, 1.0))
+    assert np.allclose(bright / 2.0**14, plain, rtol=1e-4)
+
+
+def test_walls_on_borders_of_cells() -> None:
+    """Wherever the room stands in the grid, a border included, the light is the same."""
+    truth = mean(room(), **TRUE)
+    for shift in (0.0, 2.0**-9, 2.0**-7 * 0.3137, 0.2741):
+        scene = room(translate((shift, shift, shift)))
+        scene.add("Far", box((-4, -4, -4), (4, 4, 4), inward=True), "white")  # holds the grid where it is
+        agree(mean(scene, **HASH), truth, tolerance=0.01)
+
+
+def test_large_and_small_triangles() -> None:
+    """A floor of a kilometre, and a ball of a centimetre on it, seen from a hand's breadth."""
+    scene = Description("kilometre", Camera(look_at((0, -0.08, 0.05), (0, 0, 0.004)), math.radians(40)))
+    scene.materials.update(white=diffuse((0.7, 0.7, 0.7)), red=diffuse((0.8, 0.1, 0.1)))
+    scene.add("Floor", quad((-500, -500, 0), (500, -500, 0), (500, 500, 0), (-500, 500, 0)), "white")
+    scene.add("Ball", sphere(0.005, 64, 32), "red", transform=translate((0, 0, 0.005)))
+    scene.lights = [Light("L", "point", translate((0.05, -0.05, 0.1)), 0.1)]
+    settings = dict(passes=["diffuse_indirect"], size=24, diffuse_bounces=4)
+    truth = [render(scene, samples=256, seed=i, **settings).passes["diffuse_indirect"].mean() for i in range(4)]
+    found = [render(scene, samples=64, seed=i, method="HASH_CACHE", hash_cell=1.0, **settings).passes["diffuse_indirect"].mean() for i in range(4)]
+    error = math.hypot(float(np.std(truth, ddof=1)), float(np.std(found, ddof=1))) / 2
+    assert abs(np.mean(found) - np.mean(truth)) < 4.5 * error + 0.03 * np.mean(truth)
+
+
+def test_needles_and_walls_thinner_than_a_cell() -> None:
+    """A camera inside a wall of a thousandth of the room sees no light of either side."""
+    scene = room()
+    scene.add("Wall", box((-1.1, -0.0005, -1.1), (1.1, 0.0005, 1.1)), "white")
+    scene.add("Needle", quad((-1, 0.5, 0), (1, 0.5, 0), (1, 0.5, 2e-6), (-1, 0.5, 2e-6)), "white")
+    scene.camera.transform = look_at((0, 0, 0), (1, 0, 0))
+    scene.camera.clip = (1e-5, 10.0)
+    assert render(scene, **HASH).image[..., :3].max() == 0.0
+
+
+def test_a_lamp_that_switches_with_every_frame() -> None:
+    live = Live(cornell_box(), hash_keep=2, samples=8)
+    lamp = live.built.lights["Lamp"]
+    bright = live.session.read("diffuse_indirect").mean()
+    for frame in range(6):
+        on = frame % 2 == 1
+        image = live.edit(lambda on=on: live.built.scene.set_light(lamp, power=25.0 if on else 0.0))
+        assert np.isfinite(image).all() and (image >= 0).all()
+    assert abs(image.mean() / bright - 1) < 0.3
+
+
+def test_scene_grows_far_beyond_its_first_bounds() -> None:
+    live = Live(room(), samples=4, hash_keep=4)
+    ball = live.built.instances["Ball"]
+    for away in (1e2, 1e5):
+        live.edit(lambda away=away: live.built.scene.set_transforms(ball, translate((away, 0, 0))[None]))
+        assert np.isfinite(live.session.read("diffuse_indirect")).all()
+    truth = render(Built(live.built.description).scene, **TRUE).image  # no crash with a fresh one, either
+    assert np.isfinite(truth).all()
