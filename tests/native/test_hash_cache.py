@@ -169,7 +169,11 @@ def test_cells_that_are_kept_heal() -> None:
 
 
 def test_memory_has_a_limit() -> None:
+    told: list[str] = []
+    afterglow.set_log(lambda level, text: told.append(text))
     live = Live(cornell_box(), width=96, height=96, samples=1, hash_cell=0.25, hash_memory=1.0)
+    afterglow.set_log(None)
+    assert sum("hash_memory" in text for text in told) == 1
     assert live.number("cache_bytes") < 1.1 * 2**20
     assert live.number("cells_refused") > 0
     truth = render(cornell_box(), size=32, samples=64, passes=["diffuse_indirect"], diffuse_bounces=4).passes["diffuse_indirect"].mean()
@@ -219,6 +223,18 @@ def test_debug_views_show_something(view: str) -> None:
     shown = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], hash_view=view, **HASH).passes["diffuse_indirect"]
     light = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], **HASH).passes["diffuse_indirect"]
     assert shown.max() > 0 and not np.allclose(shown, light)
+
+
+def test_an_unknown_view_says_so() -> None:
+    with pytest.raises(afterglow.InvalidInput, match="hash_view"):
+        render(cornell_box(), size=8, samples=1, hash_view="NOISE", **HASH)
+
+
+def test_a_smaller_limit_starts_anew() -> None:
+    live = Live(cornell_box(), width=96, height=96, samples=1, hash_cell=0.25)
+    assert live.number("cache_bytes") > 1.1 * 2**20
+    live.run(hash_memory=1.0)
+    assert live.number("cache_bytes") < 1.1 * 2**20 and live.number("cache_resets") == 2
 
 
 def test_a_saved_cache_is_the_same_after_reload(tmp_path: Any) -> None:

@@ -4,6 +4,7 @@
 
 #include <chrono>
 
+#include "base/log.h"
 #include "base/parallel.h"
 
 namespace afterglow::hash_cache {
@@ -25,6 +26,7 @@ Rgb scale_color(float t) {
 void Cache::configure(const CacheSettings& settings) {
   if (!(settings.caching == settings_.caching)) stale_ = true;
   settings_ = settings;
+  if (settings.limit < table_.bytes()) stale_ = true;
   table_.set_limit(settings.limit);
 }
 
@@ -32,7 +34,9 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   SceneChanges seen = changes;
   seen.camera = false;
   const InstanceMask shown = work.shown ? *work.shown : InstanceMask{};
-  const bool elsewhere = stale_ || changes.everything || changes.origin || shown != shown_instances_;
+  // Cells know objects by their numbers, which others take over when some come or go.
+  const bool renumbered = !changes.instances_added.empty() || !changes.instances_removed.empty();
+  const bool elsewhere = stale_ || renumbered || changes.everything || changes.origin || shown != shown_instances_;
   if (elsewhere || (!seen.empty() && !settings_.keep)) {
     table_.clear();
     grid_ = Grid(scene.scene.bounds());
@@ -57,8 +61,14 @@ bool Cache::trace(const WalkScene& walk, std::span<const CachePoint> points, Wor
   if (work.stop.stop()) return false;
   counts_.paths += points.size(), counts_.samples += samples.size();
   counts_.rays += rays.bounce, counts_.shadow_rays += rays.shadow, counts_.dropped += rays.dropped;
+  const bool told = table_.counts().refused || table_.counts().evicted;
   counts_.cells += table_.add(std::move(samples), stamp_, work.threads, work.stop);
   counts_.seconds_table += now() - traced;
+  if (!told && (table_.counts().refused || table_.counts().evicted))
+    log_message("warning",
+                "HashCache: its memory of " + std::to_string(settings_.limit >> 20) +
+                    " MiB is full; cells that got no light for longest make room. More memory (hash_memory) or "
+                    "larger cells (hash_cell) keep them.");
   return !work.stop.stop();
 }
 

@@ -65,7 +65,8 @@ class Grid {
   float size(int level) const { return std::ldexp(finest_, level); }
   /// The level, with its fraction, whose cells have this size.
   float level(float size) const {
-    return std::clamp(std::log2(std::max(size, finest_) / finest_), 0.0f, float(kTopLevel));
+    if (!(size > finest_)) return 0.0f;  // no number, too
+    return std::min(std::log2(size / finest_), float(kTopLevel));
   }
   Cell cell(const Vec3& position, uint32_t owner, int level) const {
     const Vec3 at = (position - corner_) / finest_;

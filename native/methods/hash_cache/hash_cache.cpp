@@ -2,6 +2,7 @@
 // HashCache as a method: its settings and statistics. See hash_cache.h.
 #include "methods/hash_cache/hash_cache.h"
 
+#include "base/errors.h"
 #include "methods/hash_cache/cache.h"
 
 namespace afterglow::hash_cache {
@@ -9,6 +10,14 @@ namespace afterglow::hash_cache {
 namespace {
 
 constexpr const char* kViews[] = {"LIGHT", "LEVEL", "COUNT", "AGE", "SIDE"};
+
+View view_of(const SettingValue& value) {
+  const auto* text = std::get_if<std::string>(&value);
+  for (int i = 0; i < 5; ++i)
+    if (text && *text == kViews[i]) return View(i);
+  throw InvalidInput("setting 'hash_view' wants LIGHT, LEVEL, COUNT, AGE or SIDE, not '" + (text ? *text : "a number") +
+                     "'");
+}
 
 class HashCache final : public IndirectMethod {
  public:
@@ -28,9 +37,7 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_keep") s.keep = uint32_t(integer_of(value));
       if (name == "hash_memory") s.limit = size_t(number_of(value) * 1048576.0);
       if (name == "hash_filter") filter_ = integer_of(value) != 0;
-      if (name == "hash_view")
-        for (int i = 0; i < 5; ++i)
-          if (const auto* text = std::get_if<std::string>(&value); text && *text == kViews[i]) s.view = View(i);
+      if (name == "hash_view") s.view = view_of(value);
     }
     cache_.configure(s);
   }
