@@ -18,6 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 
 struct Task {
+  DenoiserMaker make;
   std::shared_ptr<Denoiser> denoiser;
   std::shared_ptr<DenoiseImages> images;
   std::atomic<bool> stop{false};
@@ -29,6 +30,7 @@ struct Task {
   void run() {
     std::exception_ptr caught;
     try {
+      if (!denoiser) denoiser = make();
       const DenoiseImages& i = *images;
       denoiser->filter({.color = i.color.data(),
                         .albedo = i.albedo.empty() ? nullptr : i.albedo.data(),
@@ -42,8 +44,8 @@ struct Task {
     } catch (...) {
       caught = std::current_exception();
     }
-    denoiser.reset();
     const std::lock_guard lock(mutex);
+    if (stop) denoiser.reset();
     failure = caught;
     done = true;
     changed.notify_all();
@@ -61,9 +63,10 @@ Running running;
 
 }  // namespace
 
-void run_denoise_task(std::shared_ptr<Denoiser>& denoiser, const std::shared_ptr<DenoiseImages>& images,
-                      StopToken stop) {
+void run_denoise_task(std::shared_ptr<Denoiser>& denoiser, DenoiserMaker make,
+                      const std::shared_ptr<DenoiseImages>& images, StopToken stop) {
   const auto task = std::make_shared<Task>();
+  task->make = std::move(make);
   task->denoiser = denoiser;
   task->images = images;
   running.count++;
@@ -83,6 +86,7 @@ void run_denoise_task(std::shared_ptr<Denoiser>& denoiser, const std::shared_ptr
     denoiser.reset();
     throw Cancelled("denoising was cancelled");
   }
+  denoiser = std::move(task->denoiser);
   if (task->failure) std::rethrow_exception(task->failure);
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -18,9 +19,12 @@ struct DenoiseImages {
   bool fast = false, prefilter = false;
 };
 
-/// Filters the colour in place, on a thread of its own. Throws Cancelled a few milliseconds after `stop`: the library
-/// then ends its layer in the background, and the denoiser is taken away from the caller.
-void run_denoise_task(std::shared_ptr<Denoiser>& denoiser, const std::shared_ptr<DenoiseImages>& images,
-                      StopToken stop);
+using DenoiserMaker = std::function<std::shared_ptr<Denoiser>()>;
+
+/// Filters the colour in place, on a thread of its own, where a missing denoiser is made as well. Throws Cancelled a
+/// few milliseconds after `stop`: the library then ends its layer in the background, and the denoiser is taken away
+/// from the caller.
+void run_denoise_task(std::shared_ptr<Denoiser>& denoiser, DenoiserMaker make,
+                      const std::shared_ptr<DenoiseImages>& images, StopToken stop);
 
 }  // namespace afterglow

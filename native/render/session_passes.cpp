@@ -143,19 +143,23 @@ bool Session::filter(const RenderSettings& settings, const Film& film, Image& im
   const size_t pixels = size_t(image.width) * image.height;
   const auto images = std::make_shared<DenoiseImages>();
   images->width = image.width, images->height = image.height;
-  for (std::vector<float>* plane : {&images->color, &images->albedo, &images->normal}) plane->resize(pixels * 3);
+  for (std::vector<float>* plane : {&images->color, &images->albedo, &images->normal}) {  // a stop is obeyed after each
+    plane->resize(pixels * 3);
+    if (plane == &images->albedo) film.read(Pass::kAlbedo, plane->data());
+    if (plane == &images->normal) film.read(Pass::kDenoiseNormal, plane->data());
+    if (stop_) return false;
+  }
   for (size_t p = 0; p < pixels; ++p)
     for (size_t c = 0; c < 3; ++c) images->color[p * 3 + c] = image.rgba[p * 4 + c];
-  film.read(Pass::kAlbedo, images->albedo.data());
-  film.read(Pass::kDenoiseNormal, images->normal.data());
-  if (stop_) return false;
   images->fast = settings.viewport;
   images->prefilter = !settings.viewport && samples >= kPrefilterFrom;
   try {
-    if (!denoiser_ || denoiser_made_for_ != settings.denoiser)
-      denoiser_ = borrow_denoiser(settings.denoiser, settings.denoiser_search);
+    if (denoiser_made_for_ != settings.denoiser) denoiser_.reset();
     denoiser_made_for_ = settings.denoiser;
-    run_denoise_task(denoiser_, images, StopToken(&stop_));
+    const auto make = [id = settings.denoiser, search = settings.denoiser_search] {
+      return borrow_denoiser(id, search);
+    };
+    run_denoise_task(denoiser_, make, images, StopToken(&stop_));
   } catch (const Cancelled&) {
     return false;
   } catch (const Error& reason) {
