@@ -3,7 +3,6 @@
 #include "render/renderer.h"
 
 #include <cstdio>
-#include <filesystem>
 #include <fstream>
 
 #include "base/errors.h"
@@ -50,9 +49,7 @@ void Renderer::save(const CommittedScene& scene, const std::string& path) const 
   std::ofstream file(part, std::ios::binary | std::ios::trunc);
   file.write(bytes.data(), std::streamsize(bytes.size()));
   file.close();
-  std::error_code failure;
-  if (file) std::filesystem::rename(part, path, failure);
-  if (!file || failure) {
+  if (!file || std::rename(part.c_str(), path.c_str()) != 0) {  // std::filesystem would ask for a newer C++ library
     std::remove(part.c_str());
     throw FileError("the cache could not be written to '" + path + "'");
   }
