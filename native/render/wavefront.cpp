@@ -181,7 +181,7 @@ void join(const FilmLayout& layout, const WalkSettings& settings, const Question
     for (int c = 0; c < 3; ++c) sums[at + c] += value[c];
   };
   add(Pass::kCombined, light);
-  sums[layout[Pass::kBatches] + int(q.sample % kBatchCount)] += luminance(light);
+  sums[layout[Pass::kBatches] + int(batch_of(q.sample))] += luminance(light);
   if (q.direct) return add(Pass::kDiffuseIndirect, light);
   add(Pass::kDiffuseIndirect, light * q.diffuse);
   add(Pass::kGlossyIndirect, light * q.glossy);

@@ -80,7 +80,7 @@ void walk_request(const path_tracing::KernelInput& in, const PixelRequest& reque
       const uint32_t pixel_seed = hash(x, y, in.seed);
       bool placing = kPasses && request.first == 0 && visitor.wants_place();  // one walk more, before the first sample
       for (uint32_t i = request.first; i < request.first + request.count;) {
-        Sampler sampler(hash(pixel_seed, i % kBatchCount), i / kBatchCount);
+        Sampler sampler(hash(pixel_seed, batch_of(i)), index_in_batch(i));
         const Vec2 in_pixel = in.film.filter().offset(sampler.next2());
         const Vec2 on_lens = lens ? sampler.next2() : Vec2(0.5f);
         const Vec2 middle(float(x) + 0.5f, float(y) + 0.5f);

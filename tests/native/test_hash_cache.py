@@ -132,11 +132,14 @@ def test_fewer_paths_than_pixels_leave_no_holes() -> None:
 
 def test_the_second_frame_profits_from_the_first() -> None:
     still: dict[str, Any] = dict(pixel_filter="BOX", filter_width=0.01)  # every sample of a pixel sees the same surface
-    live = Live(cornell_box(), hash_cell=2.0, **still)
     truth = render(cornell_box(), size=32, samples=1024, diffuse_bounces=4, passes=["diffuse_indirect"], **still).passes["diffuse_indirect"]
-    errors = [float(np.median((live.run(seed=i, samples=2) - truth) ** 2)) for i in range(12)]
-    assert errors[11] < 0.5 * errors[0]
-    assert live.number("cache_resets") == 1
+    first = last = 0.0
+    for walk in range(3):  # one walk alone is within its noise of the bound
+        live = Live(cornell_box(), hash_cell=2.0, **still)
+        errors = [float(np.median((live.run(seed=100 * walk + i, samples=2) - truth) ** 2)) for i in range(12)]
+        first, last = first + errors[0], last + errors[11]
+        assert live.number("cache_resets") == 1
+    assert last < 0.5 * first
 
 
 def test_a_walk_of_the_camera_keeps_the_cells() -> None:
