@@ -3,7 +3,7 @@
 
 blender -b --factory-startup --python-exit-code 1 --python blend_files/make.py [-- NAME …]
 
-Written by Blender 3.4 so that every later version opens them; compressed and without user interface, each below 300 KB.
+Written by Blender 3.4 so that every later version opens them; compressed and without user interface.
 """
 
 import os

@@ -77,7 +77,10 @@ def test_unknown_names_are_named() -> None:
 
 
 def test_blend_files_are_small(blend_files) -> None:
+    """A repository that everybody clones: 300 KB each, more only where tens of thousands of triangles are the point."""
+    large = {"cornell_statue", "conference_room", "bouncing_bunnies", "wobbling_cylinder", "kite"}
     for name in scenes.BLEND_FILES:
         path = blend_files / f"{name}.blend"
         assert path.is_file(), f"{path} is absent: write it by blend_files/make.py"
-        assert path.stat().st_size <= 300 * 1024, name
+        assert path.stat().st_size <= (2048 if name in large else 300) * 1024, name
+    assert sum(path.stat().st_size for path in blend_files.glob("*.blend")) <= 10 * 1024**2

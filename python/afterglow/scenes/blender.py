@@ -71,6 +71,8 @@ def write(description: Description, frame: float | None = None) -> Any:
                     thing.material_slots[slot].material = materials[material_name]
             if item.move is not None and frame is None:
                 _animate(thing, item.move, description.frames)
+            if description.meshes[item.mesh].deform is not None and frame is None:
+                _deform(thing, description.meshes[item.mesh], description.frames)
     for light in description.lights:
         _light(scene, light, frame, description.frames)
     _camera(scene, description, frame)
@@ -114,6 +116,27 @@ def _animate(thing: Any, move: Any, frames: tuple[int, int]) -> None:
         previous = thing.rotation_quaternion.copy()
         for path in ("location", "rotation_quaternion", "scale"):
             thing.keyframe_insert(path, frame=frame)
+
+
+def _deform(thing: Any, mesh: Mesh, frames: tuple[int, int]) -> None:
+    """One absolute shape key for every frame, linear between them."""
+    assert mesh.deform is not None
+    keys = None
+    for frame in range(frames[0], frames[1] + 1):
+        if keys is not None:
+            keys.eval_time = 10.0 * (frame - frames[0])
+        block = thing.shape_key_add(name=f"Frame {frame}", from_mix=False)
+        keys = thing.data.shape_keys
+        keys.use_relative = False
+        block.data.foreach_set("co", np.asarray(mesh.deform(frame), np.float32).ravel())
+        block.interpolation = "KEY_LINEAR"
+    times = [block.frame for block in keys.key_blocks]
+    for frame, time in zip(range(frames[0], frames[1] + 1), times, strict=True):
+        keys.eval_time = time
+        keys.keyframe_insert("eval_time", frame=frame)
+    for curve in keys.animation_data.action.fcurves:
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
 
 
 def _mesh(name: str, mesh: Mesh, frame: float) -> Any:

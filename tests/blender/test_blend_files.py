@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The animated files of `blend_files` are, in every frame asked, the procedural scenes they were written from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+@pytest.mark.parametrize("name", ["wobbling_cylinder", "kite", "bouncing_bunnies", "desk_with_chair", "spheres"])
+def test_motion_in_the_file_is_that_of_the_scene(in_blender: Callable[..., dict[str, Any]], blend_files: Path, name: str) -> None:
+    found = in_blender(
+        f"""
+        from afterglow import scenes
+        made, off, checked = scenes.BLEND_FILES[{name!r}](), 0.0, 0
+        for frame in (1, 7, made.frames[1]):
+            bpy.context.scene.frame_set(frame)
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            for item in made.objects:
+                mesh, thing = made.meshes[item.mesh], bpy.data.objects[item.name].evaluated_get(depsgraph)
+                points = np.empty(3 * len(thing.data.vertices), np.float32)
+                thing.data.vertices.foreach_get("co", points)
+                wanted = mesh.positions if mesh.deform is None else mesh.deform(frame)
+                off = max(off, float(abs(points.reshape(-1, 3) - wanted).max()),
+                          float(abs(np.array(thing.matrix_world) - item.at(frame)[0]).max()))
+                checked += mesh.deform is not None or item.move is not None
+        result(off=off, checked=checked)
+        """,
+        blend_files / f"{name}.blend",
+    )
+    assert found["checked"] >= 3
+    assert found["off"] < 1e-5
