@@ -140,7 +140,8 @@ def compare(scene: Path, suites: list[str], versions: list[str]) -> bool:
     os.environ.pop("AFTERGLOW_LIBRARY", None)
     for suite in suites:
         name = f"debian_{suite}"
-        line = " ".join(shlex.quote(str(part)) for part in [wrapper, "-b", scene, "--python", script, "--", PICTURES / f"{name}.exr"])
+        command = [wrapper, "-b", scene, "--python", script, "--", PICTURES / f"{name}.exr"]
+        line = " ".join(shlex.quote(str(part)) for part in command)
         pictures[f"Debian {suite}"] = render(name, line, suite)
     return report(pictures)
 

@@ -32,7 +32,7 @@ def ensure(version: str) -> Path:
         raise Unavailable(f"bpy {release} needs Python 3.11, {PYTHON} is {where.stdout.strip()}")
     print(f"Making {folder} with the official Blender {release} from PyPI (about 350 MB)", file=sys.stderr, flush=True)
     subprocess.run([PYTHON, "-m", "venv", "--clear", str(folder)], check=True)
-    for attempt in range(3):
+    for _ in range(3):
         ended = subprocess.run([str(python), "-m", "pip", "install", "-q", f"bpy=={release}"], capture_output=True, text=True)
         if ended.returncode == 0:
             done.write_text(release + "\n")

@@ -56,7 +56,8 @@ if _native is not None:
         "ALL_RAYS", "CAMERA", "DIFFUSE", "GLOSSY", "SHADOW", "TRANSMISSION", "VOLUME", "Cancelled", "Error", "FileError",
         "InvalidHandle", "InvalidInput", "OutOfMemory", "Result", "Scene", "Session", "Unsupported", "__version__",
         "bsdf_evaluate", "bsdf_sample", "clear_statistics", "denoise", "denoisers", "evaluate_graph", "images",
-        "light_density", "light_sample", "method_descriptions", "metrics", "record_statistics", "render", "scenes", "set_log", "sobol",
+        "light_density", "light_sample", "method_descriptions", "metrics", "record_statistics", "render", "scenes",
+        "set_log", "sobol",
         "statistics", "versions",
     ]
 else:

@@ -42,7 +42,8 @@ class Cancelled(Error): ...
 # diffuse_bsdf [shader] color roughness normal            glossy_bsdf [shader] color roughness anisotropy rotation normal
 #             params: distribution "ggx" | "multi_ggx" | "sharp" | "beckmann" | "ashikhmin_shirley"
 # glass_bsdf, refraction_bsdf [shader] color roughness ior normal   params: distribution
-# metallic_bsdf [shader] base_color edge_tint roughness anisotropy rotation normal   params: distribution, fresnel "f82"|"physical_conductor"; ior extinction
+# metallic_bsdf [shader] base_color edge_tint roughness anisotropy rotation normal
+#             params: distribution, fresnel "f82"|"physical_conductor"; ior extinction
 # translucent_bsdf [shader] color normal        transparent_bsdf [shader] color       sheen_bsdf [shader] color roughness normal
 # subsurface_scattering [shader] (shown as diffuse)     emission [shader] color strength     background [shader] color strength
 # holdout [shader]       mix_shader [shader] fac shader shader_001        add_shader [shader] shader shader_001
@@ -51,21 +52,26 @@ class Cancelled(Error): ...
 #             mapping: 3×4 row-major or None
 # environment_texture [color] vector   params: image, interpolation, projection "equirectangular"|"mirror_ball"
 # checker_texture [color fac] vector color1 color2 scale
-# noise_texture [fac color] vector w scale detail roughness lacunarity offset gain distortion  params: dimensions "1D".."4D", noise_type, normalize
+# noise_texture [fac color] vector w scale detail roughness lacunarity offset gain distortion
+#             params: dimensions "1D".."4D", noise_type, normalize
 # voronoi_texture [distance color position w radius] vector w scale detail roughness lacunarity smoothness exponent randomness
 #             params: dimensions, feature, distance (metric), normalize
 # wave_texture [color fac] vector scale distortion detail detail_scale detail_roughness phase_offset  params: wave_type
 #             bands_direction rings_direction profile        gradient_texture [color fac] vector  params: gradient_type
-# magic_texture [color fac] vector scale distortion  params: depth         white_noise_texture [value color] vector w  params: dimensions
+# magic_texture [color fac] vector scale distortion  params: depth
+# white_noise_texture [value color] vector w  params: dimensions
 # brick_texture [color fac] vector color1 color2 mortar scale mortar_size mortar_smooth bias brick_width row_height
 #             params: offset offset_frequency squash squash_frequency
 # sky_texture [color] vector  params: sky_type preetham (sun_direction turbidity), others: sun_elevation sun_rotation sun_size
 #             sun_intensity sun_disc altitude air_density dust_density|aerosol_density ozone_density
 # texture_coordinate [generated normal uv object camera window reflection]   params: object_to_world 4×4 inverse or None
-# uv_map [uv] params: uv_map ("" = active)         attribute [color vector fac alpha] params: name, kind "geometry"|"object"|"instancer"|"view_layer"
-# color_attribute [color alpha] params: name       mapping [vector] vector location rotation scale  params: kind point|texture|vector|normal
+# uv_map [uv] params: uv_map ("" = active)
+# attribute [color vector fac alpha] params: name, kind "geometry"|"object"|"instancer"|"view_layer"
+# color_attribute [color alpha] params: name
+# mapping [vector] vector location rotation scale  params: kind point|texture|vector|normal
 # rgb [color] params: value     value [value] params: value
-# mix [result] factor a b   params: data_type "float"|"vector"|"color", blend (Blender's blend_type lower case), clamp_factor, clamp_result, factor_mode
+# mix [result] factor a b   params: data_type "float"|"vector"|"color", blend (Blender's blend_type lower case),
+#             clamp_factor, clamp_result, factor_mode
 # math [value] value value_001 value_002  params: operation (Blender's, lower case), clamp
 # vector_math [vector value] vector vector_001 vector_002 scale  params: operation
 # separate [red green blue] color  params: mode rgb|hsv|hsl|xyz         combine [color] red green blue  params: mode
@@ -75,8 +81,10 @@ class Cancelled(Error): ...
 # bright_contrast [color] color bright contrast   rgb_to_bw [val] color    clamp [result] value min max   params: kind
 # map_range [result vector] value from_min from_max to_min to_max steps vector…  params: data_type, interpolation, clamp
 # normal_map [normal] strength color  params: space "tangent"|"object"|"world"|"blender_object"|"blender_world", uv_map, shadowing
-#             "conty"|"chiang" (before Blender 4.3); a corner attribute "tangents of UV_MAP" (xyz, sign of the bitangent) is taken where it is
-# bump [normal] strength distance height normal  params: invert filter_width (pixels) shadowing         normal [normal dot] normal  params: direction
+#             "conty"|"chiang" (before Blender 4.3); a corner attribute "tangents of UV_MAP" (xyz, sign of the bitangent)
+#             is taken where it is
+# bump [normal] strength distance height normal  params: invert filter_width (pixels) shadowing
+# normal [normal dot] normal  params: direction
 # fresnel [fac] ior normal      layer_weight [fresnel facing] blend normal     camera [view_vector view_z_depth view_distance]
 # geometry [position normal tangent true_normal incoming parametric backfacing pointiness random_per_island]
 # light_path [is_camera_ray is_shadow_ray is_diffuse_ray is_glossy_ray is_singular_ray is_reflection_ray is_transmission_ray
@@ -98,7 +106,13 @@ class Changes(TypedDict):
     seconds: float            # spent in commit, BVH included
 
 # bits of visibility: to which rays an instance, a light or the world shows itself
-CAMERA: int; DIFFUSE: int; GLOSSY: int; TRANSMISSION: int; SHADOW: int; VOLUME: int; ALL_RAYS: int
+CAMERA: int
+DIFFUSE: int
+GLOSSY: int
+TRANSMISSION: int
+SHADOW: int
+VOLUME: int
+ALL_RAYS: int
 
 class Scene:
     """Plain tables edited by handle. Edits take effect at `commit`; while a Session renders this scene, edit inside
@@ -147,7 +161,8 @@ class Scene:
 
     def add_light(self, kind: str, transform: NDArray[np.float64], *, name: str, color: tuple[float, float, float],
                   power: float, radius: float = 0.0, angle: float = 0.0, spot_size: float = 0.0, spot_blend: float = 0.0,
-                  shape: str = "square", size: tuple[float, float] = (1, 1), spread: float = 3.14159265, graph: Graph | None = None,
+                  shape: str = "square", size: tuple[float, float] = (1, 1), spread: float = 3.14159265,
+                  graph: Graph | None = None,
                   visibility: int = ..., cast_shadow: bool = True, multiple_importance: bool = True, soft_falloff: bool = True,
                   version: int = 2) -> int:
         """kind "point" (power in W, radius), "spot" (power in W, radius, spot_size full cone angle, spot_blend 0–1),
@@ -203,7 +218,8 @@ class Session:
         sample_clamp_direct sample_clamp_indirect (0: off) caustics_reflective caustics_refractive
         pixel_filter "BLACKMAN_HARRIS"|"GAUSSIAN"|"BOX", filter_width; film_transparent; film_exposure
         passes: names of the passes to keep (below); denoise: bool; denoiser "AUTO"|…
-        viewport: bool (start coarse: passes at 1/8, 1/4, 1/2 of the resolution first); mist (start, depth, "quadratic"|"linear"|"inverse_quadratic")
+        viewport: bool (start coarse: passes at 1/8, 1/4, 1/2 of the resolution first)
+        mist (start, depth, "quadratic"|"linear"|"inverse_quadratic")
         local_view: instance handles that this view shows, or None."""
     def start(self) -> None: ...
     def wait(self, timeout: float = ...) -> bool: ...   # True: finished (or failed: raises)
@@ -243,18 +259,21 @@ def versions() -> dict[str, str]: ...   # embree, tbb, openimageio, pybind11, co
 def set_log(sink: Callable[[str, str], None] | None) -> None: ...
 
 # For tests and researchers: the building blocks by themselves.
-def bsdf_evaluate(graph: Graph, wo: NDArray[np.float32], wi: NDArray[np.float32], **point: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def bsdf_evaluate(graph: Graph, wo: NDArray[np.float32], wi: NDArray[np.float32],
+                  **point: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """value × |cos| (N, 3) and density (N,) for directions in the local frame (z = normal)."""
 def bsdf_sample(graph: Graph, wo: NDArray[np.float32], u: NDArray[np.float32], **point: Any) -> dict[str, NDArray[Any]]: ...
 def evaluate_graph(graph: Graph, points: Mapping[str, NDArray[Any]], **point: Any) -> dict[str, Any]:
     """A material's graph at N points (position, normal, face_normal, incoming (N, 3), uv (N, 2); one row: for all). Returns
     emission, transparency, diffuse, glossy, transmission (albedos), normal of the first lobe (N, 3), lobes (N,), warnings,
     folded, instructions. Keywords as in bsdf_evaluate: backfacing, drop_glossy, drop_refractive, kind (of the ray), fold."""
-def light_sample(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32], u: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+def light_sample(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32],
+                 u: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
     """Choices of a light and a direction from N points (arrays of one row stand for all): u (N, 3) are the choice and two
     numbers for the direction; normal 0: from all sides. valid, direction (N, 3), distance, radiance (N, 3), density
     (solid angle, choice included), delta, light."""
-def light_density(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32], direction: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+def light_density(scene: Scene, point: NDArray[np.float64], normal: NDArray[np.float32],
+                  direction: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
     """What rays meet, as a surface's own samples would: distance, radiance (N, 3), and the density with which light_sample
     chooses the same direction on what was met (nearest light or surface; else suns and world together)."""
 def record_rays(scene: Scene, settings: Mapping[str, Any] = ..., most: int = 500_000) -> dict[str, NDArray[np.float64]]:

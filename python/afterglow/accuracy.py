@@ -196,10 +196,12 @@ def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, 
         spread = float(np.std(errors, ddof=1) / math.sqrt(repeats)) if repeats > 1 else 0.0
         assert shown is not None
         points.append(Point(
-            setting.method, setting.name, float(np.median(seconds)), float(np.mean(errors)), math.hypot(spread, float(np.mean(bars))),
+            setting.method, setting.name, float(np.median(seconds)), float(np.mean(errors)),
+            math.hypot(spread, float(np.mean(bars))),
             metrics.trimmed_relmse(shown, whole), metrics.ms_ssim(shown, whole) if min(shown.shape[:2]) >= 11 else float("nan"),
             metrics.flip(shown, whole), statistics.get("believed_error"), float(statistics.get("samples") or 0)))
-        say(f"{setting.method:24} {setting.name:14} {points[-1].seconds:8.2f} s  relMSE {points[-1].error:.5f} ± {points[-1].error_bar:.5f}")
+        last = points[-1]
+        say(f"{setting.method:24} {setting.name:14} {last.seconds:8.2f} s  relMSE {last.error:.5f} ± {last.error_bar:.5f}")
     return points
 
 

@@ -3,7 +3,8 @@
 
 blender -b --python blender_server.py -- FD FOLDER: answers go to the file descriptor FD as lines of JSON, images to FOLDER.
 Jobs: {"op": "open", "file", "percent"}, {"op": "render", "engine", "settings", "multilayer", "out"}, {"op": "memory"},
-{"op": "grid", "triangles"}, {"op": "save", "file"}, {"op": "script", "file", "arguments"}. Started by `afterglow.blenders`; what Blender prints stays on standard output.
+{"op": "grid", "triangles"}, {"op": "save", "file"}, {"op": "script", "file", "arguments"}.
+Started by `afterglow.blenders`; what Blender prints stays on standard output.
 """
 
 import json

@@ -52,7 +52,8 @@ def layers(path: str | Path) -> dict[str, Array]:
             groups.setdefault(name or "combined", []).append(index)
         for name, indices in groups.items():
             order = sorted(indices, key=lambda i: ("RGBXYZUVA".find(spec.channelnames[i][-1].upper()), i))
-            result.setdefault("combined" if name == "Combined" else name, pixels.reshape(spec.height, spec.width, -1)[::-1, :, order])
+            result.setdefault("combined" if name == "Combined" else name,
+                              pixels.reshape(spec.height, spec.width, -1)[::-1, :, order])
         part += 1
     source.close()
     return {name: np.ascontiguousarray(pixels) for name, pixels in result.items()}

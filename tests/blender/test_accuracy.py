@@ -48,7 +48,8 @@ def test_a_failing_job_names_the_reason_and_the_worker_goes_on(worker, blend_fil
 @pytest.mark.slow
 def test_accuracy_of_a_file(library: Path, root: Path, blend_files: Path, tmp_path: Path) -> None:
     ended = subprocess.run(
-        [sys.executable, "-m", "afterglow", "accuracy", str(blend_files / "cornell_box.blend"), "--percent", "10", "--samples", "256",
+        [sys.executable, "-m", "afterglow", "accuracy", str(blend_files / "cornell_box.blend"), "--percent", "10",
+         "--samples", "256",
          "--repeats", "1", "--budget", "3", "--output", str(tmp_path)], capture_output=True, text=True, cwd=root,
         env={**os.environ, "PYTHONPATH": str(library), "AFTERGLOW_CACHE": str(tmp_path / "cache")})
     assert ended.returncode == 0, ended.stdout + ended.stderr

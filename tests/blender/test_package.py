@@ -52,7 +52,8 @@ def ask(command: list[str], archive: Path, folder: Path, scene: Path, env: dict[
 @pytest.mark.parametrize("version", VERSIONS)
 def test_extension_in_official_blender(version: str, package: dict[str, Path], bpy_venv: Callable[[str], Path],
                                        blend_files: Path, tmp_path: Path) -> None:
-    found = ask([*offline(), str(bpy_venv(version)), str(INSIDE)], package["extension"], tmp_path, blend_files / "cornell_box.blend",
+    found = ask([*offline(), str(bpy_venv(version)), str(INSIDE)], package["extension"], tmp_path,
+                blend_files / "cornell_box.blend",
                 {"BLENDER_USER_RESOURCES": str(tmp_path / "user")})
     expect(found)
     assert ".".join(map(str, found["blender"])).startswith(version)

@@ -36,7 +36,8 @@ def render(scene: Any, size: int = SIZE, samples: int = 32, **settings: Any) -> 
 
 def mean(scene: Any, repeats: int = 4, **settings: Any) -> Mean:
     """Mean over the image, channels and `repeats` seeds."""
-    values = np.array([float(render(scene, seed=100 + i, **settings).image[..., :3].mean(dtype=np.float64)) for i in range(repeats)])
+    values = np.array([float(render(scene, seed=100 + i, **settings).image[..., :3].mean(dtype=np.float64))
+                       for i in range(repeats)])
     return Mean(float(values.mean()), float(values.std(ddof=1) / repeats**0.5))
 
 

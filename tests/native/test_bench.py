@@ -53,7 +53,8 @@ def test_the_fewest_samples(needed: int, found: int | None) -> None:
 
 
 def test_stages_tell_what_synchronizing_took() -> None:
-    stages = [[0.1, "Synchronizing object | Sun"], [0.2, "Synchronizing object | Sheet"], [0.7, "Initializing"], [0.9, "Updating"]]
+    stages = [[0.1, "Synchronizing object | Sun"], [0.2, "Synchronizing object | Sheet"], [0.7, "Initializing"],
+              [0.9, "Updating"]]
     assert staged(stages) == pytest.approx(0.6)
     assert staged([[0.1, ""], [0.2, ""]]) is None and staged([]) is None
 
@@ -101,7 +102,8 @@ def test_one_failing_figure_does_not_end_the_bench(tmp_path: Path, monkeypatch: 
     monkeypatch.setitem(bench.SETS, "some", {"unavailable": unavailable, "broken": broken, "fine": fine})
     said: list[str] = []
     lengths: list[int] = []
-    figures = bench.run("some", Context(tmp_path, say=said.append), ["unavailable", "broken", "fine"], lambda f: lengths.append(len(f)))
+    figures = bench.run("some", Context(tmp_path, say=said.append), ["unavailable", "broken", "fine"],
+                        lambda f: lengths.append(len(f)))
     assert [f.holds for f in figures] == [False, False, True] and lengths == [1, 2, 3]
     assert "nothing here" in figures[0].note and "ZeroDivisionError" in figures[1].note
     assert figures[2].command == "make bench NAME=some FIGURE=fine"

@@ -129,7 +129,8 @@ def test_caustics_off_keeps_the_diffuse_share() -> None:
     value, density = native.bsdf_evaluate(layered, wo, wi, drop_glossy=True, drop_refractive=True)
     np.testing.assert_allclose(value, 0.75 * 0.8 / np.pi, rtol=1e-5)  # metal gone, dielectric gone without its albedo
     np.testing.assert_allclose(density, 0.8 / np.pi, rtol=1e-5)
-    half = native.bsdf_sample(SMOOTH["glass"], wo, np.random.default_rng(0).random((500, 3), dtype=np.float32), drop_refractive=True)
+    half = native.bsdf_sample(SMOOTH["glass"], wo, np.random.default_rng(0).random((500, 3), dtype=np.float32),
+                              drop_refractive=True)
     assert not half["transmitted"][half["valid"]].any()
 
 

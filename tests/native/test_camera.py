@@ -10,6 +10,7 @@ import pytest
 from test_scene import at, square
 
 WIDTH, HEIGHT = 64, 48
+UNMOVED = np.eye(4)
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +20,7 @@ def ag(library):
     return afterglow
 
 
-def rays(ag: Any, kind: str, pixels: Any, lens: Any = None, matrix: np.ndarray = np.eye(4), **camera: Any) -> dict[str, Any]:
+def rays(ag: Any, kind: str, pixels: Any, lens: Any = None, matrix: np.ndarray = UNMOVED, **camera: Any) -> dict[str, Any]:
     scene = ag.Scene()
     scene.set_camera(kind, matrix, **({"window": (-0.8, 0.8, -0.6, 0.6)} | camera))
     scene.commit()

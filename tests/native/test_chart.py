@@ -9,7 +9,8 @@ NAMES = {"svg": "http://www.w3.org/2000/svg"}
 
 
 def test_lines_are_well_formed_and_in_order() -> None:
-    line = chart.Line("a < b", [(1, 0.1), (10, 0.01), (100, 0.001), (5, float("nan")), (7, -1)], [0.01, 0.001, 0.002], ["x & y"], 1)
+    line = chart.Line("a < b", [(1, 0.1), (10, 0.01), (100, 0.001), (5, float("nan")), (7, -1)], [0.01, 0.001, 0.002],
+                      ["x & y"], 1)
     root = ElementTree.fromstring(chart.lines("title", [line, chart.Line("empty", [])], "s", "e"))
     points = root.find("svg:polyline", NAMES).get("points").split()  # type: ignore[union-attr]
     places = [tuple(map(float, p.split(","))) for p in points]

@@ -25,7 +25,8 @@ GUIDES = ("combined", "albedo", "denoise_normal")
 def copies(bpy_venv: Callable[[str], Path]) -> list[str]:
     """Folders that hold a copy."""
     found = [place for place in os.environ.get("AFTERGLOW_OIDN", "").split(":") if place]
-    found += [str(path.parent) for path in bpy_venv("5.0").parent.parent.glob("lib/python*/site-packages/bpy/lib/libOpenImageDenoise.so*")]
+    pattern = "lib/python*/site-packages/bpy/lib/libOpenImageDenoise.so*"
+    found += [str(path.parent) for path in bpy_venv("5.0").parent.parent.glob(pattern)]
     if not found:
         pytest.skip("no copy of OpenImageDenoise: official Blender 5.0 is absent")
     return list(dict.fromkeys(found))
@@ -66,7 +67,8 @@ def test_the_error_falls(copies: list[str], noisy: dict[str, np.ndarray], truth:
 def test_inputs_stay_and_alpha_is_left_out(copies: list[str], noisy: dict[str, np.ndarray]) -> None:
     kept = {name: image.copy() for name, image in noisy.items()}
     rgba = afterglow.denoise(*(noisy[name] for name in GUIDES), search=copies)
-    rgb = afterglow.denoise(np.ascontiguousarray(noisy["combined"][..., :3]), noisy["albedo"], noisy["denoise_normal"], search=copies)
+    rgb = afterglow.denoise(np.ascontiguousarray(noisy["combined"][..., :3]), noisy["albedo"], noisy["denoise_normal"],
+                            search=copies)
     np.testing.assert_array_equal(rgba, rgb)
     for name in GUIDES:
         np.testing.assert_array_equal(noisy[name], kept[name])
@@ -124,14 +126,16 @@ def test_wrong_input_is_refused(copies: list[str]) -> None:
 def session(built: Built, copies: list[str], width: int, height: int, **settings: object) -> afterglow.Session:
     built.set_camera((width, height), 0)
     built.scene.commit()
-    return afterglow.Session(built.scene, {"width": width, "height": height, "denoise": True, "denoiser_search": copies, **settings})
+    return afterglow.Session(built.scene, {"width": width, "height": height, "denoise": True, "denoiser_search": copies,
+                                           **settings})
 
 
 def test_a_render_is_denoised(copies: list[str], truth: np.ndarray) -> None:
     """The picture alone, its alpha as it was; guides are kept without being asked for. Few samples or many."""
     for samples in (2, 8):
         plain = afterglow.render("cornell_textured", width=SIZE, height=SIZE, samples=samples, seed=1)
-        clean = afterglow.render("cornell_textured", width=SIZE, height=SIZE, samples=samples, seed=1, denoise=True, denoiser_search=copies)
+        clean = afterglow.render("cornell_textured", width=SIZE, height=SIZE, samples=samples, seed=1, denoise=True,
+                                 denoiser_search=copies)
         assert clean.statistics["denoiser"] and not clean.statistics["warnings"], clean.statistics
         assert clean.statistics["seconds"]["denoise"] > 0
         assert metrics.relmse(clean.image, truth) < metrics.relmse(plain.image, truth) / 2

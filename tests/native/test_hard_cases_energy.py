@@ -108,7 +108,7 @@ def test_grazing_light_follows_the_cosine() -> None:
     scene = one_quad(diffuse((0.8, 0.8, 0.8)))
     angle = np.radians(89.9)
     scene.lights = [Light("Sun", "sun", look_at((np.sin(angle), 0, np.cos(angle)), (0, 0, 0)), 1000.0, angle=0.0)]
-    value, error = mean(scene, samples=4, repeats=2, max_bounces=0, diffuse_bounces=0)
+    value, _ = mean(scene, samples=4, repeats=2, max_bounces=0, diffuse_bounces=0)
     assert value == pytest.approx(1000 * 0.8 / np.pi * np.cos(angle), rel=2e-3)
 
 

@@ -43,7 +43,8 @@ def show(scene: afterglow.Scene, samples: int = 4) -> np.ndarray:
 
 def add(scene: afterglow.Scene, name: str, positions: np.ndarray, triangles: object = ((0, 1, 2),), transform: object = None,
         **more: object) -> None:
-    mesh = scene.add_mesh(name=name, positions=np.asarray(positions, np.float32), triangles=np.asarray(triangles, np.int32), **more)
+    mesh = scene.add_mesh(name=name, positions=np.asarray(positions, np.float32),
+                          triangles=np.asarray(triangles, np.int32), **more)
     place = np.eye(4)[None] if transform is None else np.asarray(transform, np.float64).reshape(-1, 4, 4)
     scene.add_instances(mesh, place, name=name, materials=[scene.add_material(WHITE, name=f"{name} material")])
 
@@ -325,7 +326,8 @@ def test_light_beyond_the_film_is_dropped_and_counted(value: float, shines: bool
 
 def test_odd_graphs_render_and_warn_once() -> None:
     graphs = {
-        "unknown": {"nodes": [{"type": "no_such_node", "name": "x", "params": {}, "inputs": {}}], "surface": ("link", 0, "shader")},
+        "unknown": {"nodes": [{"type": "no_such_node", "name": "x", "params": {}, "inputs": {}}],
+                    "surface": ("link", 0, "shader")},
         "nothing": {"nodes": [], "surface": None},
     }
     for name, graph in graphs.items():

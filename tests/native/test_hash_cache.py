@@ -31,7 +31,8 @@ class Live:
 
     def __init__(self, description: Description, start: bool = True, **settings: Any) -> None:
         self.built = Built(description)
-        self.settings = {**HASH, "width": 32, "height": 32, "samples": 2, "diffuse_bounces": 4, "passes": ["combined", "diffuse_indirect"],
+        self.settings = {**HASH, "width": 32, "height": 32, "samples": 2, "diffuse_bounces": 4,
+                         "passes": ["combined", "diffuse_indirect"],
                          **settings}
         self.built.set_camera((self.settings["width"], self.settings["height"]), 0)
         self.built.scene.commit()
@@ -67,7 +68,8 @@ class Live:
 def test_furnace(albedo: float) -> None:
     """Radiance e (1 + a + … + a^(n+1)), as the path tracer's bounce limit has it."""
     expected = sum((1 - albedo) * albedo**k for k in range(6))
-    values = [float(render(furnace(albedo), size=12, samples=16, seed=i, diffuse_bounces=4, **HASH).image[..., :3].mean(dtype=np.float64))
+    values = [float(render(furnace(albedo), size=12, samples=16, seed=i, diffuse_bounces=4,
+                           **HASH).image[..., :3].mean(dtype=np.float64))
               for i in range(6)]
     error = float(np.std(values, ddof=1) / len(values) ** 0.5)
     assert abs(np.mean(values) - expected) < 4.5 * error + 1e-4
@@ -85,7 +87,8 @@ def test_cornell_box_has_the_path_tracers_bounces(bounces: int) -> None:
 def test_rooms_have_the_path_tracers_light(variant: str) -> None:
     scene = cornell_box(variant)
     settings = dict(size=16, caustics_reflective=False, caustics_refractive=False, diffuse_bounces=4)
-    truth = [render(scene, method="PATH_TRACING", samples=128, seed=i, **settings).image[..., :3].mean(dtype=np.float64) for i in range(4)]
+    truth = [render(scene, method="PATH_TRACING", samples=128, seed=i, **settings).image[..., :3].mean(dtype=np.float64)
+             for i in range(4)]
     found = [render(scene, samples=32, seed=i, **HASH, **settings).image[..., :3].mean(dtype=np.float64) for i in range(4)]
     means = [Mean(float(np.mean(v)), float(np.std(v, ddof=1) / 2)) for v in (found, truth)]
     agree(means[0], means[1], tolerance=0.01)
@@ -132,7 +135,8 @@ def test_fewer_paths_than_pixels_leave_no_holes() -> None:
 
 def test_the_second_frame_profits_from_the_first() -> None:
     still: dict[str, Any] = dict(pixel_filter="BOX", filter_width=0.01)  # every sample of a pixel sees the same surface
-    truth = render(cornell_box(), size=32, samples=1024, diffuse_bounces=4, passes=["diffuse_indirect"], **still).passes["diffuse_indirect"]
+    truth = render(cornell_box(), size=32, samples=1024, diffuse_bounces=4, passes=["diffuse_indirect"],
+                   **still).passes["diffuse_indirect"]
     first = last = 0.0
     for walk in range(3):  # one walk alone is within its noise of the bound
         live = Live(cornell_box(), hash_cell=2.0, **still)
@@ -179,7 +183,8 @@ def test_memory_has_a_limit() -> None:
     assert sum("hash_memory" in text for text in told) == 1
     assert live.number("cache_bytes") < 1.1 * 2**20
     assert live.number("cells_refused") > 0
-    truth = render(cornell_box(), size=32, samples=64, passes=["diffuse_indirect"], diffuse_bounces=4).passes["diffuse_indirect"].mean()
+    truth = render(cornell_box(), size=32, samples=64, passes=["diffuse_indirect"],
+                   diffuse_bounces=4).passes["diffuse_indirect"].mean()
     assert abs(live.session.read("diffuse_indirect").mean() / truth - 1) < 0.2
 
 
@@ -223,7 +228,8 @@ def test_nothing_to_light_and_nothing_to_light_it() -> None:
 
 @pytest.mark.parametrize("view", ["LEVEL", "COUNT", "AGE", "SIDE"])
 def test_debug_views_show_something(view: str) -> None:
-    shown = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], hash_view=view, **HASH).passes["diffuse_indirect"]
+    shown = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], hash_view=view,
+                   **HASH).passes["diffuse_indirect"]
     light = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], **HASH).passes["diffuse_indirect"]
     assert shown.max() > 0 and not np.allclose(shown, light)
 

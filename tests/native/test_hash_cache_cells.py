@@ -84,7 +84,8 @@ def test_coarser_levels_are_the_finer_ones_halved() -> None:
         derived = occupied[levels].reshape(m, n, m, n, m, n).any((1, 3, 5))
         assert np.array_equal(derived.repeat(n, 0).repeat(n, 1).repeat(n, 2), occupied[level])
         index = found["index"][level]
-        assert np.array_equal(np.unique(index[index >= 0]), np.arange(found["cells"][level])), "data without holes, nothing shared"
+        assert np.array_equal(np.unique(index[index >= 0]),
+                              np.arange(found["cells"][level])), "data without holes, nothing shared"
     assert found["cells"][0] == 1
 
 

@@ -66,7 +66,8 @@ def test_large_and_small_triangles() -> None:
     scene.lights = [Light("L", "point", translate((0.05, -0.05, 0.1)), 0.1)]
     settings = dict(passes=["diffuse_indirect"], size=24, diffuse_bounces=4)
     truth = [render(scene, samples=256, seed=i, **settings).passes["diffuse_indirect"].mean() for i in range(4)]
-    found = [render(scene, samples=64, seed=i, method="HASH_CACHE", hash_cell=1.0, **settings).passes["diffuse_indirect"].mean() for i in range(4)]
+    found = [render(scene, samples=64, seed=i, method="HASH_CACHE", hash_cell=1.0,
+                    **settings).passes["diffuse_indirect"].mean() for i in range(4)]
     error = math.hypot(float(np.std(truth, ddof=1)), float(np.std(found, ddof=1))) / 2
     assert abs(np.mean(found) - np.mean(truth)) < 4.5 * error + 0.03 * np.mean(truth)
 

@@ -71,7 +71,8 @@ def test_filters_between_texels() -> None:
     np.testing.assert_allclose(flat, 0.3, rtol=1e-5)  # the weights sum to 1
 
 
-@pytest.mark.parametrize(("extension", "expected"), [("repeat", RED), ("extend", GREEN), ("clip", (0.0, 0.0, 0.0)), ("mirror", GREEN)])
+@pytest.mark.parametrize(("extension", "expected"), [("repeat", RED), ("extend", GREEN), ("clip", (0.0, 0.0, 0.0)),
+                                                     ("mirror", GREEN)])
 def test_outside(extension: str, expected: tuple[float, ...]) -> None:
     values, _ = seen(FOUR, [(1.25, 0.25)], params={"extension": extension}, colorspace="linear")
     np.testing.assert_allclose(values[0], expected[:3], atol=1e-6)
@@ -120,7 +121,8 @@ def test_missing_and_broken_files_are_magenta_and_told(tmp_path: Path) -> None:
 def test_a_file_on_disk(tmp_path: Path) -> None:
     path = tmp_path / "four.png"
     path.write_bytes(png(FOUR * 255))
-    np.testing.assert_allclose(seen(str(path), CENTRES, colorspace="sRGB")[0], [RED[:3], GREEN[:3], BLUE[:3], WHITE[:3]], atol=1e-6)
+    np.testing.assert_allclose(seen(str(path), CENTRES, colorspace="sRGB")[0],
+                               [RED[:3], GREEN[:3], BLUE[:3], WHITE[:3]], atol=1e-6)
 
 
 def test_places_that_are_no_numbers() -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import afterglow
@@ -213,7 +214,7 @@ def test_repair_on_demand_shows_the_same_image() -> None:
     for on_demand in (False, True):
         live, rng, state = Live(room(), cache_on_demand=on_demand), np.random.default_rng(8), {}
         for _ in range(12):
-            numbers = live.edit(lambda: random_edit(live, rng, state))
+            numbers = live.edit(partial(random_edit, live, rng, state))
             assert numbers["verified_worst"] <= 1e-5
         images.append(live.image())
     assert abs(images[0] - images[1]).mean() < 0.02 * images[0][..., :3].mean()
@@ -224,7 +225,7 @@ def test_one_and_two_threads_show_the_same_image_through_edits() -> None:
     for threads in (1, 2):
         live, rng, state = Live(room(), threads=threads, width=40, height=30), np.random.default_rng(4), {}
         for _ in range(8):
-            live.edit(lambda: random_edit(live, rng, state))
+            live.edit(partial(random_edit, live, rng, state))
         images.append(live.image())
     assert np.array_equal(images[0], images[1])
 

@@ -69,7 +69,8 @@ def seen(lamps: list[dict[str, Any]], samples: int = 4, size: int = 32) -> tuple
     eye[2, 3] = 10.0
     scene.set_camera("perspective", eye, window=(-1, 1, -1, 1))
     scene.commit()
-    settings = {"width": size, "height": size, "samples": samples, "accuracy": 0.0, "threads": 1, "method": "PATH_TRACING", "max_bounces": 2}
+    settings = {"width": size, "height": size, "samples": samples, "accuracy": 0.0, "threads": 1,
+                "method": "PATH_TRACING", "max_bounces": 2}
     best = 1e9
     for _ in range(3):
         session = afterglow.Session(scene, settings)
@@ -83,7 +84,8 @@ def seen(lamps: list[dict[str, Any]], samples: int = 4, size: int = 32) -> tuple
 def panel(x: float, y: float, z: float, upwards: bool = True, size: float = 2.0, power: float = 100.0) -> dict[str, Any]:
     matrix = np.diag([1.0, -1.0, -1.0, 1.0]) if upwards else np.eye(4)
     matrix[:3, 3] = x, y, z
-    return {"kind": "area", "shape": "square", "size": (size, size), "transform": matrix, "name": "panel", "color": (1, 1, 1), "power": power}
+    return {"kind": "area", "shape": "square", "size": (size, size), "transform": matrix, "name": "panel",
+            "color": (1, 1, 1), "power": power}
 
 
 def test_lamps_in_one_place_shine_together() -> None:
@@ -110,7 +112,8 @@ def test_edits_that_touch_no_emitter_do_not_collect_them_again() -> None:
     y, x = np.mgrid[0:rows, 0:rows].astype(np.float32)
     points = np.stack([x, y, np.sin(0.3 * x) * np.cos(0.2 * y)], -1).reshape(-1, 3)
     first = (np.arange(rows - 1)[:, None] * rows + np.arange(rows - 1)).ravel()
-    triangles = np.concatenate([np.stack([first, first + 1, first + rows], -1), np.stack([first + 1, first + rows + 1, first + rows], -1)])
+    triangles = np.concatenate([np.stack([first, first + 1, first + rows], -1),
+                                np.stack([first + 1, first + rows + 1, first + rows], -1)])
     scene = afterglow.Scene()
     node = {"type": "emission", "name": "Emission", "params": {}, "inputs": {"color": (1, 1, 1), "strength": 1.0}}
     glow = scene.add_material({"nodes": [node], "surface": ("link", 0, "shader")}, name="glow")

@@ -19,7 +19,8 @@ def errors(variant: str, samples: int) -> tuple[float, float]:
     scale = truth.mean()
     found = []
     for on in (False, True):
-        images = [render(scene, size=40, samples=samples, seed=i, hash_filter=on, **SETTINGS).passes["diffuse_indirect"] for i in range(4)]
+        images = [render(scene, size=40, samples=samples, seed=i, hash_filter=on, **SETTINGS).passes["diffuse_indirect"]
+                  for i in range(4)]
         found.append(float(np.mean([np.median((x - truth) ** 2) for x in images])) / float(scale**2))
     return found[0], found[1]
 

@@ -92,7 +92,8 @@ def test_mix_and_add_share_their_parts() -> None:
     for k in range(60):  # each adds the one before to itself, halved: 2^60 paths, one weight
         chain.append(node("transparent_bsdf", color=(0, 0, 0)))
         chain.append(node("add_shader", shader=link(max(0, 3 * k), "shader"), shader_001=link(max(0, 3 * k), "shader")))
-        chain.append(node("mix_shader", fac=0.5, shader=link(len(chain) - 2, "shader"), shader_001=link(len(chain) - 1, "shader")))
+        chain.append(node("mix_shader", fac=0.5, shader=link(len(chain) - 2, "shader"),
+                          shader_001=link(len(chain) - 1, "shader")))
     result = native.evaluate_graph({"nodes": chain, "surface": link(len(chain) - 1, "shader")}, {})
     np.testing.assert_allclose(result["diffuse"][0], 0.5, rtol=1e-5)
 
@@ -209,7 +210,8 @@ def test_missing_inputs_links_and_nodes() -> None:
 def test_ten_thousand_nodes_in_a_row_and_side_by_side() -> None:
     deep = [node("geometry")]
     for k in range(10_000):
-        deep.append(node("vector_math", {"operation": "add"}, vector=link(k, "vector" if k else "position"), vector_001=(1e-4, 0, 0)))
+        deep.append(node("vector_math", {"operation": "add"}, vector=link(k, "vector" if k else "position"),
+                         vector_001=(1e-4, 0, 0)))
     graph = emitting(*deep, output="vector")
     np.testing.assert_allclose(emission(graph)[0, 0], 1.0, rtol=1e-3)
     wide = [node("diffuse_bsdf", color=(k % 7 / 7, 0.5, 0.5)) for k in range(5000)]
@@ -227,7 +229,8 @@ def test_a_tree_too_large_is_grey_and_told() -> None:
     nodes = values + lobes
     first = len(values)
     for k in range(2999):
-        nodes.append(node("add_shader", shader=link(first + k + 1, "shader"), shader_001=link(first + 3000 + k - 1 if k else first, "shader")))
+        nodes.append(node("add_shader", shader=link(first + k + 1, "shader"),
+                          shader_001=link(first + 3000 + k - 1 if k else first, "shader")))
     result = native.evaluate_graph({"nodes": nodes, "surface": link(len(nodes) - 1, "shader")}, {})
     finite(result)
     assert any("too large" in text for text in result["warnings"])

@@ -56,7 +56,8 @@ def test_a_lamp_close_above_a_surface_lights_it(kind: str, height: float) -> Non
         corners = [(x - half, -half, height), (x - half, half, height), (x + half, half, height), (x + half, -half, height)]
         scene.add("Lamp", quad(*corners), "lamp")
     else:
-        scene.lights.append(Light("Lamp", "area", translate((x, 0, height)), 3.0 * math.pi * 4 * half**2, size=(2 * half, 2 * half)))
+        scene.lights.append(Light("Lamp", "area", translate((x, 0, height)), 3.0 * math.pi * 4 * half**2,
+                                  size=(2 * half, 2 * half)))
     grid = (np.arange(400) + 0.5) / 400 * 2 * half - half
     distance2 = (x + grid[:, None]) ** 2 + grid**2 + height**2
     expected = 0.5 / math.pi * 3.0 * 4 * half**2 * float((height**2 / distance2**2).mean())

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from test_scene import SQUARE, TWO, at, down, square
 
+UNMOVED = np.eye(4)
+
 
 @pytest.fixture(scope="module")
 def ag(library):
@@ -288,7 +290,7 @@ def test_normals(ag) -> None:
     tilted = np.array([[-0.6, 0, 0.8], [0.6, 0, 0.8], [0.6, 0, 0.8], [-0.6, 0, 0.8]], np.float32)
     rays = np.array([[0.25, 0.1, 5.0]]), np.array([[0.0, 0.0, -1.0]])
 
-    def look(arguments: dict[str, Any], matrix: np.ndarray = np.eye(4), below: bool = False) -> dict[str, np.ndarray]:
+    def look(arguments: dict[str, Any], matrix: np.ndarray = UNMOVED, below: bool = False) -> dict[str, np.ndarray]:
         scene = ag.Scene()
         scene.add_instances(square(scene, **arguments), matrix, name="o")
         scene.commit()

@@ -126,7 +126,7 @@ def test_edited_session_equals_a_fresh_one() -> None:
 
 
 def test_update_changes_size_and_settings() -> None:
-    built, s = session(samples=4)
+    _built, s = session(samples=4)
     s.start()
     s.update({"width": 32, "height": 48, "passes": ["depth"]})
     s.wait()
@@ -166,7 +166,7 @@ def test_accuracy_stops_at_the_error_asked_for() -> None:
 
 
 def test_viewport_shows_whole_images_from_the_first_on() -> None:
-    built, s = session(samples=24, viewport=True)
+    _built, s = session(samples=24, viewport=True)
     s.start()
     seen: list[tuple[int, np.ndarray]] = []
     while not s.wait(0.001):

@@ -65,7 +65,8 @@ def runtimes(package: Path) -> tuple[list[contents.Notice], list[str]]:
         for maker in makers:
             known = [pattern for pattern in contents.RUNTIMES if re.match(pattern, maker)]
             if not known:
-                raise RuntimeError(f"{binary.name} was made by '{maker}': tools/shipping/contents.py knows nothing of its runtime")
+                raise RuntimeError(f"{binary.name} was made by '{maker}': "
+                                   "tools/shipping/contents.py knows nothing of its runtime")
             used |= set(known)
         lines.append(f"  {binary.name.split('.')[0]}: {'; '.join(makers)}")
     return [notice for pattern, group in contents.RUNTIMES.items() if pattern in used for notice in group], lines
@@ -87,7 +88,8 @@ def _recipes() -> dict[str, str]:
 def _entry(notice: contents.Notice, version: str = "") -> str:
     lines = [f"{notice.title} {version}".strip(), *(f"  Copyright (c) {line}" for line in notice.copyrights)]
     commit = _recipes().get(notice.recipe, "")
-    lines += [f"  Licence: {notice.licence} (text below)", f"  Source: {notice.source}" + (f", commit {commit}" if commit else "")]
+    lines += [f"  Licence: {notice.licence} (text below)",
+              f"  Source: {notice.source}" + (f", commit {commit}" if commit else "")]
     return "\n".join(lines)
 
 

@@ -47,7 +47,8 @@ def without_scale(matrix: Any) -> NDArray[np.float64]:
 
 def pixel_border(border: Window, width: int, height: int) -> tuple[int, int, int, int]:
     """Pixels of a border given in fractions of the image, at least one. Rounded in 32 bits, as Blender does."""
-    left, right, bottom, top = (int(np.float32(edge) * np.float32(size)) for edge, size in zip(border, (width, width, height, height)))
+    left, right, bottom, top = (int(np.float32(edge) * np.float32(size))
+                                for edge, size in zip(border, (width, width, height, height)))
     x0, y0 = min(max(left, 0), width - 1), min(max(bottom, 0), height - 1)
     return (x0, y0, min(max(right, x0 + 1), width), min(max(top, y0 + 1), height))
 

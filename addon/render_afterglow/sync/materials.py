@@ -85,7 +85,8 @@ class MaterialTable:
     def begin(self, depsgraph: Any, updates: Any, report: Any) -> None:
         """Recompiles at once the known materials that may differ; others when an object asks for them."""
         self._report, self._dirty_images = report, updates.images
-        self._everything = updates.everything or updates.trees or bool(updates.images) or depsgraph.scene.frame_current != self._frame
+        self._everything = (updates.everything or updates.trees or bool(updates.images)
+                            or depsgraph.scene.frame_current != self._frame)
         self._frame = depsgraph.scene.frame_current
         self._view = (depsgraph.view_layer_eval, depsgraph.scene_eval, depsgraph.scene_eval.world)
         self._fresh, self.attributes_changed = set(), False
@@ -179,7 +180,8 @@ class MaterialTable:
             self._reads_matrix = True  # nobody tells when it changes: read again with each sync
             return property_of(self._view, name)
         self._reads_owner = True
-        return property_of(self._owner.places(kind == "INSTANCER" or name == "color"), name)  # instances wear their maker's colour
+        # instances wear their maker's colour
+        return property_of(self._owner.places(kind == "INSTANCER" or name == "color"), name)
 
     def _matrix(self, ob: Any) -> list[list[float]]:
         self._reads_matrix = True

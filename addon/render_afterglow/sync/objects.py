@@ -222,7 +222,8 @@ class ObjectTable:
         else:
             self._warn_of(ob)
             parent = instance.parent if instance.is_instance else None
-            pairs = [self.materials.handle(material, ob.name, use.is_points, Owner(ob, parent)) for material in self._slots(ob, data)]
+            pairs = [self.materials.handle(material, ob.name, use.is_points, Owner(ob, parent))
+                     for material in self._slots(ob, data)]
             bits, holdout, catcher = object_visibility(ob, parent, self.layer)
             if catcher:
                 self.warn(f"Object '{ob.name}': shadow catchers are not supported yet: shown as an ordinary object")
@@ -298,7 +299,8 @@ class ObjectTable:
     @staticmethod
     def _names(use: MeshUse) -> frozenset[str]:
         attributes = getattr(use.data, "attributes", ())
-        return frozenset(name for name in use.wanted if name in ("", GENERATED) or name.startswith(TANGENTS) or name in attributes)
+        return frozenset(name for name in use.wanted if name in ("", GENERATED) or name.startswith(TANGENTS)
+                         or name in attributes)
 
     def _read_mesh(self, use: MeshUse, address: int, names: frozenset[str], known: MeshEntry | None) -> MeshEntry:
         entry = MeshEntry(known.handle if known else None, use.key, address, fingerprint_of(use), names)

@@ -156,7 +156,8 @@ class SceneSync:
 
         if view is None and depsgraph.scene.render.use_motion_blur:
             self.warn(f"Scene '{depsgraph.scene.name}': motion blur is not supported yet: rendered sharp")
-        if view is None and any(getattr(layer, f"use_pass_cryptomatte_{kind}", False) for kind in ("object", "material", "asset")):
+        if view is None and any(getattr(layer, f"use_pass_cryptomatte_{kind}", False)
+                                for kind in ("object", "material", "asset")):
             self.warn(f"View layer '{layer.name}': Cryptomatte is not supported yet: its passes are left out")
         self.materials.begin(depsgraph, updates, report)
         report.seconds["materials"] = self._lap(start, report)

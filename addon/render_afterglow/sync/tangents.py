@@ -72,7 +72,8 @@ def _angles(points: Floats, normals: Floats) -> Floats:
 
 def _averaged(values: Floats, triangles: NDArray[Any], normals: Floats, uv: Floats, right: NDArray[np.bool_]) -> Floats:
     """(3T, 3): at each corner the sum over all corners that are the same point of the surface."""
-    words = np.concatenate([triangles.reshape(-1, 1).astype(np.uint32), np.ascontiguousarray(normals.reshape(-1, 3)).view(np.uint32),
+    words = np.concatenate([triangles.reshape(-1, 1).astype(np.uint32),
+                            np.ascontiguousarray(normals.reshape(-1, 3)).view(np.uint32),
                             np.ascontiguousarray(uv.reshape(-1, 2)).view(np.uint32),
                             np.repeat(right, 3).astype(np.uint32)[:, None]], axis=1)
     key = np.zeros(len(words), np.uint64)

@@ -99,7 +99,8 @@ def write(name: str, figures: list[Figure], folder: Path, about: Mapping[str, An
                           (folder / f"{name}_details.json", rows)):
         file.write_text(json.dumps({**about, "figures": content}, indent=1, ensure_ascii=False) + "\n")
     bars = [(f.title(), f.margin(), f.relative_spread(), bool(f.holds)) for f in figures]
-    shown = [(title, margin, spread, holds) for title, margin, spread, holds in bars if margin is not None and math.isfinite(margin)]
+    shown = [(title, margin, spread, holds)
+             for title, margin, spread, holds in bars if margin is not None and math.isfinite(margin)]
     if shown:
         (folder / f"{name}.svg").write_text(chart.bars(f"{name}: margin to each goal", shown))
     return path
@@ -120,16 +121,17 @@ def main(arguments: Any) -> int:
         return 0
     os.environ.setdefault("AFTERGLOW_CACHE", str(blenders.project() / "build" / "cache"))
     about = {"machine": machine(), "versions": versions()}
+    folder = Path(arguments.output)
     missed = False
     for name in names:
         # A run of single figures leaves the whole table as it is.
         file = name if keys[name] == list(SETS[name]) else "_".join([name, *keys[name]])
-        folder = Path(arguments.output)
         context = Context(folder, pairs=max(1, arguments.pairs))
         start = time.perf_counter()
         figures = run(name, context, keys[name], lambda so_far, file=file: write(file, so_far, folder, about))  # type: ignore[misc]
         print(table(figures))
         missing = [figure for figure in figures if figure.holds is not True]
-        print(f"{len(figures) - len(missing)} of {len(figures)} hold; {clock(time.perf_counter() - start)}; {folder / file}.json, .svg")
+        print(f"{len(figures) - len(missing)} of {len(figures)} hold; {clock(time.perf_counter() - start)}; "
+              f"{folder / file}.json, .svg")
         missed |= bool(missing)
     return int(missed)

@@ -7,6 +7,7 @@ with two independent references of both frames, √max(0, mean((Δx − Δr₁)(
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,7 +22,7 @@ def still_flicker(frames: Sequence[Any], reference: Any) -> Estimate:
     if len(images) < 2:
         raise ValueError("flicker takes two frames or more")
     level = rgb(reference).mean()
-    steps = np.array([np.abs(a - b).mean() / level for a, b in zip(images, images[1:])])
+    steps = np.array([np.abs(a - b).mean() / level for a, b in itertools.pairwise(images)])
     return Estimate(float(steps.mean()), float(steps.std(ddof=1) / len(steps) ** 0.5) if len(steps) > 1 else float("nan"))
 
 

@@ -28,7 +28,8 @@ def _fluted_pillar(height: float = 4.0, flutes: int = 20, rings: int = 24) -> An
 def pillared_hall(rows: int = 10) -> Description:
     """Two rows of fluted pillars under a vault, light from one side and a skylight: about 80,000 triangles."""
     length = 2.4 * rows
-    scene = Description("pillared_hall", Camera(look_at((0.6, -length / 2 + 0.8, 1.7), (-0.3, length / 2, 1.6)), math.radians(70)),
+    scene = Description("pillared_hall",
+                        Camera(look_at((0.6, -length / 2 + 0.8, 1.7), (-0.3, length / 2, 1.6)), math.radians(70)),
                         resolution=(300, 200))
     scene.materials.update(stone=diffuse((0.7, 0.65, 0.55)), floor=diffuse((0.5, 0.4, 0.35)), lamp=emission(30.0, (1, 0.9, 0.75)))
     scene.meshes["Pillar"] = _fluted_pillar()
@@ -53,10 +54,12 @@ def pillared_hall(rows: int = 10) -> Description:
 
 def office_with_blinds() -> Description:
     """Desks in a room lit by the sky through forty slats."""
-    scene = Description("office_with_blinds", Camera(look_at((2.4, -2.6, 1.7), (-1.5, 1.2, 0.8)), math.radians(62)), resolution=(320, 180))
+    scene = Description("office_with_blinds", Camera(look_at((2.4, -2.6, 1.7), (-1.5, 1.2, 0.8)), math.radians(62)),
+                        resolution=(320, 180))
     scene.materials.update(
         wall=diffuse((0.75, 0.74, 0.7)), carpet=diffuse((0.25, 0.27, 0.3)), wood=diffuse((0.5, 0.33, 0.2)),
-        slat=node("mix_shader", fac=0.3, shader=diffuse((0.8, 0.8, 0.76)), shader_001=node("translucent_bsdf", color=(0.8, 0.8, 0.76))),
+        slat=node("mix_shader", fac=0.3, shader=diffuse((0.8, 0.8, 0.76)),
+                  shader_001=node("translucent_bsdf", color=(0.8, 0.8, 0.76))),
         screen=node("principled", base_color=(0.02, 0.02, 0.025), roughness=0.1), seat=diffuse((0.15, 0.2, 0.35)),
     )
     walls = join(
@@ -79,7 +82,8 @@ def office_with_blinds() -> Description:
     desks = [translate((x, y, 0)) for x in (-1.6, 0.6) for y in (-0.8, 1.3)]
     scene.objects.append(Object("Desk", "Desk", np.array(desks), ("wood",)))
     scene.objects.append(Object("Screen", "Screen", np.array([d @ translate((0, 0.1, 0)) for d in desks]), ("screen",)))
-    scene.objects.append(Object("Chair", "Chair", np.array([d @ translate((0, -0.75, 0)) @ rotate(0.3) for d in desks]), ("seat",)))
+    scene.objects.append(Object("Chair", "Chair", np.array([d @ translate((0, -0.75, 0)) @ rotate(0.3) for d in desks]),
+                                ("seat",)))
     scene.lights = [Light("Sun", "sun", look_at((-5, 1.0, 3.5), (0, 0, 0)), 12.0, (1, 0.92, 0.8), angle=math.radians(0.6))]
     scene.world = background((0.6, 0.75, 1.0), 2.0)
     return scene
@@ -97,11 +101,13 @@ def _chair(segments: int = 24) -> Any:
 
 def conference_room(chairs: int = 40) -> Description:
     """A long table, cushioned chairs, lamps in the ceiling: about 200,000 triangles, few of them instances."""
-    scene = Description("conference_room", Camera(look_at((3.6, -4.4, 2.1), (-0.8, 1.5, 0.7)), math.radians(65)), resolution=(320, 180))
+    scene = Description("conference_room", Camera(look_at((3.6, -4.4, 2.1), (-0.8, 1.5, 0.7)), math.radians(65)),
+                        resolution=(320, 180))
     scene.materials.update(
         wall=diffuse((0.72, 0.7, 0.66)), carpet=diffuse((0.3, 0.12, 0.12)), steel=node(
             "principled", base_color=(0.7, 0.7, 0.7), metallic=1.0, roughness=0.3),
-        table=node("principled", base_color=(0.35, 0.18, 0.08), roughness=0.2), cushion=diffuse((0.1, 0.15, 0.3)), lamp=emission(12.0),
+        table=node("principled", base_color=(0.35, 0.18, 0.08), roughness=0.2), cushion=diffuse((0.1, 0.15, 0.3)),
+        lamp=emission(12.0),
     )
     scene.add("Room", box((-4.5, -6, 0), (4.5, 6, 3.0), inward=True), "wall")
     scene.add("Carpet", transformed(grid(8.98, 11.98, 60, 80, lambda x, y: 0.004 * np.sin(40 * x) * np.sin(37 * y)),

@@ -22,19 +22,22 @@ def _bounce(x: float, y: float, height: float, period: float, phase: float, size
         t = (frame / period + phase) % 1.0
         lift = height * 4 * t * (1 - t)
         squash = 1 - 0.18 * max(0.0, 1 - lift / (0.15 * height))
-        return translate((x, y, lift)) @ rotate(spin * frame) @ scale((size / math.sqrt(squash), size / math.sqrt(squash), size * squash))
+        return translate((x, y, lift)) @ rotate(spin * frame) @ scale(
+            (size / math.sqrt(squash), size / math.sqrt(squash), size * squash))
 
     return move
 
 
 def _hall(scene: Description, radius: float) -> None:
-    scene.materials.update(wall=diffuse((0.72, 0.7, 0.66)), floor=diffuse((0.5, 0.42, 0.33)), lamp=emission(14.0, (1, 0.95, 0.85)))
+    scene.materials.update(wall=diffuse((0.72, 0.7, 0.66)), floor=diffuse((0.5, 0.42, 0.33)),
+                           lamp=emission(14.0, (1, 0.95, 0.85)))
     scene.add("Room", box((-radius, -radius, -0.001), (radius, radius, radius), inward=True), "wall")
     scene.add("Floor", grid(2 * radius, 2 * radius, 2, 2), "floor")
     from .shapes import quad
 
     w = radius / 3
-    scene.add("Lamp", quad((-w, w, radius * 0.99), (w, w, radius * 0.99), (w, -w, radius * 0.99), (-w, -w, radius * 0.99)), "lamp")
+    scene.add("Lamp", quad((-w, w, radius * 0.99), (w, w, radius * 0.99), (w, -w, radius * 0.99),
+                           (-w, -w, radius * 0.99)), "lamp")
 
 
 def bouncing_bunnies(count: int = 9, divisions: int = 76, moving: int | None = None) -> Description:
@@ -84,10 +87,12 @@ def wobbling_cylinder(segments: int = 128, rings: int = 128) -> Description:
 
 def kite() -> Description:
     """A translucent kite with a tail over a field: a deforming sheet under sun and sky, its shadow wandering."""
-    scene = Description("kite", Camera(look_at((0, -6, 1.2), (0, 0, 1.6)), math.radians(45)), frames=(1, 48), resolution=(320, 180))
+    scene = Description("kite", Camera(look_at((0, -6, 1.2), (0, 0, 1.6)), math.radians(45)), frames=(1, 48),
+                        resolution=(320, 180))
     scene.materials.update(
         field=diffuse((0.2, 0.35, 0.1)),
-        cloth=node("mix_shader", fac=0.4, shader=diffuse((0.8, 0.15, 0.1)), shader_001=node("translucent_bsdf", color=(0.8, 0.15, 0.1))),
+        cloth=node("mix_shader", fac=0.4, shader=diffuse((0.8, 0.15, 0.1)),
+                   shader_001=node("translucent_bsdf", color=(0.8, 0.15, 0.1))),
         tail=diffuse((0.9, 0.8, 0.1)), wall=diffuse((0.75, 0.75, 0.72)),
     )
     scene.add("Field", grid(30, 30, 40, 40, lambda x, y: 0.08 * np.sin(1.3 * x) * np.cos(1.1 * y)), "field")
@@ -103,7 +108,8 @@ def kite() -> Description:
 
     def fly(frame: float) -> Any:
         t = 2 * math.pi * frame / 48
-        return translate((0.9 * math.sin(t), 0.3 * math.cos(2 * t), 2.2 + 0.3 * math.sin(2 * t))) @ rotate(1.0, "x") @ rotate(0.3 * math.sin(t))
+        place = translate((0.9 * math.sin(t), 0.3 * math.cos(2 * t), 2.2 + 0.3 * math.sin(2 * t)))
+        return place @ rotate(1.0, "x") @ rotate(0.3 * math.sin(t))
 
     sheet.deform, sheet.positions, sheet.smooth = cloth, cloth(1), True
     scene.add("Kite", sheet, "cloth", move=fly)
@@ -127,7 +133,8 @@ def kite() -> Description:
 
 def bouncing_spheres(count: int = 66, segments: int = 32) -> Description:
     """`count` balls, glossy and mirror-like among them, bouncing in a room."""
-    scene = Description("spheres", Camera(look_at((0, -0.95, 0.7), (0, 0.1, 0.25)), math.radians(62)), frames=(1, 24), resolution=(320, 180))
+    scene = Description("spheres", Camera(look_at((0, -0.95, 0.7), (0, 0.1, 0.25)), math.radians(62)), frames=(1, 24),
+                        resolution=(320, 180))
     _hall(scene, 1.0)
     from .description import Object
 

@@ -115,7 +115,8 @@ class Built:
 
 
 def _light_arguments(light: Light, frame: float) -> dict[str, Any]:
-    arguments: dict[str, Any] = dict(kind=light.kind, transform=light.at(frame), name=light.name, color=light.color, power=light.power)
+    arguments: dict[str, Any] = dict(kind=light.kind, transform=light.at(frame), name=light.name, color=light.color,
+                                     power=light.power)
     if light.kind in ("point", "spot"):
         arguments["radius"] = light.radius
     if light.kind == "spot":

@@ -32,7 +32,8 @@ def sun_and_sky(sun: bool = True) -> Description:
     """A statue, a bunny and some blocks on a field, lit by a picture of a sky and by the sun."""
     scene = Description("sun_and_sky", Camera(look_at((0.3, -5.5, 1.9), (0, 0, 0.75)), math.radians(36)), resolution=(320, 180))
     scene.materials.update(ground=diffuse((0.35, 0.33, 0.25)), stone=diffuse((0.7, 0.66, 0.6), 0.5),
-                           brick=diffuse((0.55, 0.2, 0.12)), lacquer=node("principled", base_color=(0.5, 0.05, 0.08), roughness=0.2))
+                           brick=diffuse((0.55, 0.2, 0.12)),
+                           lacquer=node("principled", base_color=(0.5, 0.05, 0.08), roughness=0.2))
     scene.images["sky"] = sky_picture()
     scene.world = background(node("environment_texture", {"image": "sky"}))
     scene.add("Ground", grid(40, 40, 8, 8), "ground")

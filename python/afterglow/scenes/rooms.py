@@ -197,7 +197,8 @@ def sealed_box(outside: float = 1000.0) -> Description:
 
 def veach_door() -> Description:
     """A room lit only through a door ajar, with a table, three vessels and a picture on the wall."""
-    scene = Description("veach_door", Camera(look_at((-0.6, -3.6, 1.5), (0.15, 1, 0.85)), math.radians(52)), resolution=(320, 180))
+    scene = Description("veach_door", Camera(look_at((-0.6, -3.6, 1.5), (0.15, 1, 0.85)), math.radians(52)),
+                        resolution=(320, 180))
     scene.materials.update(
         wall=diffuse((0.75, 0.73, 0.7)), floor=diffuse((0.35, 0.28, 0.22), 0.5), door=diffuse((0.4, 0.25, 0.13)),
         clay=diffuse((0.6, 0.25, 0.15)), metal=node("principled", base_color=(0.85, 0.8, 0.7), metallic=1.0, roughness=0.3),

@@ -103,7 +103,8 @@ def bump_node(compiler: Compiler, view: NodeView) -> Outputs:
              "normal": view.input("Normal")}
     width = view.input("Filter Width") if view.has("Filter Width") else 1.0  # before 4.3: always a pixel
     return {"Normal": compiler.link("normal", "bump", view.node.name, given, invert=view.node.invert,
-                                    shadowing=closures.bump_shadowing(), filter_width=1.0 if is_link(width) or width is None else float(width),
+                                    shadowing=closures.bump_shadowing(),
+                                    filter_width=1.0 if is_link(width) or width is None else float(width),
                                     version=closures.generation("bump"))}
 
 

@@ -56,7 +56,8 @@ def strangers(context: Context) -> list[Figure]:
     differing = [line.split()[0] for line in report[:-1] if not line.rstrip()[-1:].isdigit()]
     figure = Figure("strangers' files that agree", f"{len(files)} files", int(report[-1].split()[1]), "files",
                     "Cycles 5.0.1, 512 samples", len(files), None, f"≥ {WANTED}",
-                    note=f"differ: {', '.join(differing)}" if differing else "", details={"report": report, "failed": failed}).judged()
+                    note=f"differ: {', '.join(differing)}" if differing else "",
+                    details={"report": report, "failed": failed}).judged()
     if failed:
         figure.holds, figure.note = False, f"failed: {', '.join(failed)}; {figure.note}"
     return [figure]

@@ -44,9 +44,11 @@ def measure(context: Context) -> list[Figure]:
         raise blenders.Unavailable("valgrind is absent")
     binary = program()
     with ThreadPoolExecutor(2) as pool:  # counts, not times: they may run at once
-        (chosen, one), (bare, two), (full, three) = pool.map(lambda kernel: instructions(binary, kernel), ("chosen", "bare", "full"))
-    figure = Figure("instructions of the chosen kernel", "diffuse Cornell box", chosen, "instructions", "kernel of nothing else", bare,
-                    chosen / bare, "≤ 1.01", details={"chosen": one, "bare": two, "full": three, "all_features": full}).judged()
+        (chosen, one), (bare, two), (full, three) = pool.map(lambda kernel: instructions(binary, kernel),
+                                                             ("chosen", "bare", "full"))
+    figure = Figure("instructions of the chosen kernel", "diffuse Cornell box", chosen, "instructions",
+                    "kernel of nothing else", bare, chosen / bare, "≤ 1.01",
+                    details={"chosen": one, "bare": two, "full": three, "all_features": full}).judged()
     if one != two:
         figure.holds, figure.note = False, f"the pictures differ: {one}; {two}"
     return [figure]

@@ -40,8 +40,8 @@ def error(context: Context) -> list[Figure]:
     value = metrics.relmse(image, truth)
     details = {"trimmed": metrics.trimmed_relmse(image, truth), "mean_ratio": metrics.mean_ratio(image, truth),
                "seconds": answer["seconds"], "statistics": answer["statistics"]}
-    return [Figure("relMSE at 256 spp", "country_kitchen 640×360", value, "", "reference by Cycles, 2048 spp", None, None, "≤ 0.012",
-                   details=details).judged()]
+    return [Figure("relMSE at 256 spp", "country_kitchen 640×360", value, "", "reference by Cycles, 2048 spp",
+                   None, None, "≤ 0.012", details=details).judged()]
 
 
 def samples_per_second(context: Context) -> list[Figure]:
@@ -94,8 +94,8 @@ def denoised_errors(worker: blenders.Worker, engine: str, context: Context) -> t
 
     def enough(samples: int) -> bool:
         if engine == "CYCLES":
-            key = {"kind": "denoised_errors", "file": cache.file_key(file), "truth": cache.file_key(reference), "percent": PERCENT,
-                   "blender": worker.version, "samples": samples, "seeds": SEEDS}
+            key = {"kind": "denoised_errors", "file": cache.file_key(file), "truth": cache.file_key(reference),
+                   "percent": PERCENT, "blender": worker.version, "samples": samples, "seeds": SEEDS}
             found = cache.arrays(key, lambda: errors(samples))["errors"]
         else:
             found = errors(samples)["errors"]
@@ -143,5 +143,5 @@ def memory(context: Context) -> list[Figure]:
                 peaks[engine].append(worker.job("memory")["peak"])
                 version = worker.version
     ours, theirs = (statistics.median(peaks[engine]) for engine in ("AFTERGLOW", "CYCLES"))
-    return [Figure("peak memory", "country_kitchen 640×360", ours / 2**20, "MiB", f"Cycles {version}", theirs / 2**20, ours / theirs,
-                   "≤ 1.2", details={"peaks": peaks, "with the file open": before}).judged()]
+    return [Figure("peak memory", "country_kitchen 640×360", ours / 2**20, "MiB", f"Cycles {version}", theirs / 2**20,
+                   ours / theirs, "≤ 1.2", details={"peaks": peaks, "with the file open": before}).judged()]

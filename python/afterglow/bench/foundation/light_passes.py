@@ -16,7 +16,8 @@ SEEDS, SAMPLES, PERCENT = 8, 64, 50
 KITCHEN = dict(seeds=4, samples=64, percent=25)
 # The names of Blender 5.0 and, behind each, of those before.
 LIGHT = {"combined": "combined", "Diffuse Direct": "DiffDir", "Diffuse Indirect": "DiffInd", "Glossy Direct": "GlossDir",
-         "Glossy Indirect": "GlossInd", "Transmission Direct": "TransDir", "Transmission Indirect": "TransInd", "Emission": "Emit",
+         "Glossy Indirect": "GlossInd", "Transmission Direct": "TransDir", "Transmission Indirect": "TransInd",
+         "Emission": "Emit",
          "Environment": "Env"}
 OLD = {old: new for new, old in LIGHT.items()}
 
@@ -24,7 +25,8 @@ OLD = {old: new for new, old in LIGHT.items()}
 def files() -> list[tuple[Path, dict[str, int]]]:
     """Every file of blend_files, and the kitchen where it is."""
     found: list[tuple[Path, dict[str, int]]] = [
-        (path, dict(seeds=SEEDS, samples=SAMPLES, percent=PERCENT)) for path in sorted((blenders.project() / "blend_files").glob("*.blend"))]
+        (path, dict(seeds=SEEDS, samples=SAMPLES, percent=PERCENT))
+        for path in sorted((blenders.project() / "blend_files").glob("*.blend"))]
     try:
         kitchen = blenders.shared_scenes() / "country_kitchen.blend"
         if kitchen.is_file():
@@ -83,11 +85,13 @@ def measure(context: Context) -> list[Figure]:
     figures = []
     with blenders.Worker.of_official("5.0") as worker:
         for file, effort in files():
-            key = {"kind": "cycles_means", "file": cache.file_key(file), "blender": worker.version, "passes": list(LIGHT), **effort}
+            key = {"kind": "cycles_means", "file": cache.file_key(file), "blender": worker.version,
+                   "passes": list(LIGHT), **effort}
             theirs = cache.arrays(key, lambda f=file, e=effort: means(worker, "CYCLES", f, **e))
             ours = means(worker, "AFTERGLOW", file, **effort)
             worst, name, details = compare(ours, theirs)
-            figure = Figure("means of image and light passes", file.stem, worst, "of what is allowed", f"Cycles {worker.version}", 1.0,
+            figure = Figure("means of image and light passes", file.stem, worst, "of what is allowed",
+                            f"Cycles {worker.version}", 1.0,
                             None, "≤ 1", note=describe(name, details), details=details).judged()
             context.say(f"      {file.stem}: {worst:.2f} of what is allowed; {figure.note}")
             figures.append(figure)

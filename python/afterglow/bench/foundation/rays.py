@@ -28,7 +28,8 @@ def measure(context: Context) -> list[Figure]:
             wrapped, bare = list(map(float, times["wrapped"])), list(map(float, times["bare"]))
             speed = [theirs / ours for ours, theirs in zip(wrapped, bare)]
             figure = Figure(f"replayed {kind} rays", name, count / 1e6 / statistics.median(wrapped), "Mray/s", "bare Embree",
-                            count / 1e6 / statistics.median(bare), statistics.median(speed), "≥ 0.8", spread=spread_of_median(speed),
+                            count / 1e6 / statistics.median(bare), statistics.median(speed), "≥ 0.8",
+                            spread=spread_of_median(speed),
                             details={"rays": count, "hits": int(times["hits_wrapped"]), "ratios": speed}).judged()
             if times["hits_wrapped"] != times["hits_bare"]:  # then the comparison says nothing
                 figure.holds, figure.note = False, f"hits differ: {times['hits_wrapped']} and {times['hits_bare']}"

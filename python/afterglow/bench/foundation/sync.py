@@ -57,7 +57,8 @@ def measure(context: Context) -> list[Figure]:
                 of_cycles(worker), of_afterglow(worker)  # the first reading pays for pages and modules
                 pairs = alternate(max(7, context.pairs), lambda: of_afterglow(worker), lambda: of_cycles(worker))
                 figures.append(Figure(
-                    "sync of a mesh", f"{triangles:,} triangles, Blender {worker.version}", 1e3 * statistics.median(pairs.ours), "ms",
+                    "sync of a mesh", f"{triangles:,} triangles, Blender {worker.version}",
+                    1e3 * statistics.median(pairs.ours), "ms",
                     "Cycles in the same Blender", 1e3 * statistics.median(pairs.theirs), pairs.median, "≤ 1", spread=pairs.spread,
                     details={"ours": pairs.ours, "cycles": pairs.theirs, "ratios": pairs.ratios}).judged())
     return figures

@@ -31,4 +31,5 @@ def measure(context: Context) -> list[Figure]:
 
 
 def _figure(name: str, one: np.ndarray, two: np.ndarray) -> Figure:
-    return Figure("largest difference between 1 and 2 threads", name, float(np.abs(one - two).max()), "", "itself", 0.0, None, "= 0").judged()
+    return Figure("largest difference between 1 and 2 threads", name, float(np.abs(one - two).max()), "", "itself", 0.0,
+                  None, "= 0").judged()
