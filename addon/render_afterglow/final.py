@@ -200,6 +200,8 @@ def status_text(progress: dict[str, Any]) -> str:
         parts.append(f"{progress['samples']} samples")
     if progress.get("error") is not None:
         parts.append(f"error {progress['error']:.2%}")
+    elif progress.get("noise") is not None:
+        parts.append(f"noise {progress['noise']:.2%}")
     if progress.get("remaining") is not None:
         parts.append(f"remaining {clock(progress['remaining'])}")
     return " | ".join(parts)
@@ -227,6 +229,8 @@ def stamp(result: Any, layer: str, statistics: dict[str, Any]) -> None:
     error = statistics.get("believed_error")
     if error is not None:
         fields["believed_error"] = f"{error:.6f}"
+    elif statistics.get("noise") is not None:
+        fields["noise"] = f"{statistics['noise']:.6f}"
     for stage, seconds in (statistics.get("seconds") or {}).items():
         fields[f"seconds.{stage}"] = f"{seconds:.3f}"
     for kind, count in (statistics.get("rays") or {}).items():

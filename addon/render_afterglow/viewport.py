@@ -321,6 +321,8 @@ def view_status(method: str, progress: dict[str, Any]) -> str:
     parts = [method.replace("_", " ").title(), f"{progress['samples']} samples"]
     if progress.get("error") is not None:
         parts.append(f"error {progress['error']:.1%}")
+    elif progress.get("noise") is not None:
+        parts.append(f"noise {progress['noise']:.1%}")
     parts.append(f"{progress['elapsed']:.1f} s")
     if progress["state"] == "paused":
         parts.append("paused")

@@ -42,6 +42,7 @@ struct MethodTraits {
   uint32_t interleave = 1;   // n: neighbouring pixels ask n × n different parts of the lights; answers want the
                              // discontinuity buffer
   bool fills_holes = false;  // prepare() wants only the points that gather() could not answer
+  bool exact = false;        // samples are independent and without bias: what they spread by is the picture's error
 };
 
 struct CachePoint {  // a diffuse lobe that asks for light

@@ -88,7 +88,8 @@ py::dict progress(PySession& session) {
   d["remaining"] = known(p.remaining);
   d["elapsed"] = p.elapsed;
   d["stage"] = p.stage;
-  d["error"] = known(p.error);
+  d["error"] = known(p.exact ? p.noise : -1.0);
+  d["noise"] = known(p.noise);
   d["generation"] = p.generation;
   if (!p.failure.empty()) d["failure"] = p.failure;
   return d;
@@ -113,9 +114,11 @@ py::dict statistics(PySession& session) {
   d["elapsed"] = s.elapsed;
   d["seconds"] = seconds;
   d["rays"] = rays;
-  d["believed_error"] = known(s.error.value);
-  d["error_low"] = known(s.error.low);
-  d["error_high"] = known(s.error.high);
+  const BelievedError error = s.exact ? s.noise : BelievedError{};
+  d["believed_error"] = known(error.value);
+  d["error_low"] = known(error.low);
+  d["error_high"] = known(error.high);
+  d["noise"] = known(s.noise.value);
   d["bytes"] = bytes;
   d["dropped"] = dropped;
   d["values"] = values;
@@ -276,6 +279,8 @@ void bind_session(py::module_& m) {
           "save_cache", [](PySession& s, const std::string& path) { s->save_cache(path); }, py::arg("path"), Free())
       .def(
           "load_cache", [](PySession& s, const std::string& path) { s->load_cache(path); }, py::arg("path"), Free())
+      .def(
+          "forget_cache", [](PySession& s) { s->forget_cache(); }, Free())
       .def("progress", &progress)
       .def("passes", [](PySession& s) { return pass_names(s->passes()); })
       .def("read", &read, py::arg("name") = "combined", py::arg("out") = py::none())

@@ -21,6 +21,8 @@ class Renderer {
   /// Keeps it for the next render, if its method remembers anything.
   static void leave(const CommittedScene&, std::unique_ptr<Renderer>);
   const std::string& method() const { return id_; }
+  /// Whether what samples spread by is the picture's error, or noise alone.
+  bool exact() const { return method_->traits().exact; }
   void configure(const Settings&);
 
   /// Brings the method up to date with the scene. Not while render() runs.

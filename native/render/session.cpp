@@ -151,15 +151,16 @@ SessionProgress Session::progress() const {
   p.stage = stage_;
   p.failure = failure_text_;
   p.samples = statistics_.samples;
-  p.error = statistics_.error.value;
+  p.noise = statistics_.noise.value;
+  p.exact = statistics_.exact;
   p.elapsed = elapsed();
   const uint64_t done = samples_done_.load();
   if (film_) {
     const FilmSettings& f = film_->settings();
     const double pixels = double(f.x1 - f.x0) * double(f.y1 - f.y0);
     p.fraction = std::min(1.0, double(done) / std::max(1.0, pixels * shown_settings_.samples));
-    if (shown_settings_.accuracy > 0.0f && p.error > 0.0)  // the error's square falls with the samples
-      p.fraction = std::max(p.fraction, std::min(1.0, std::pow(shown_settings_.accuracy / p.error, 2.0)));
+    if (shown_settings_.accuracy > 0.0f && p.noise > 0.0)  // its square falls with the samples
+      p.fraction = std::max(p.fraction, std::min(1.0, std::pow(shown_settings_.accuracy / p.noise, 2.0)));
     if (shown_settings_.time_limit > 0.0f)
       p.fraction = std::max(p.fraction, std::min(1.0, p.elapsed / shown_settings_.time_limit));
     if (p.fraction > 0.0 && state_ == SessionState::kRunning) p.remaining = p.elapsed / p.fraction - p.elapsed;
@@ -264,6 +265,7 @@ void Session::run(RenderSettings settings) {
       film_step_ = settings.viewport ? kCoarsestStep : 1;
       if (!settings.viewport) shown_ = nullptr;
       statistics_.method = renderer.method();
+      statistics_.exact = renderer.exact();
       statistics_.effects = scene_->effects.bits;
       statistics_.threads = thread_count(settings.threads);
       statistics_.bytes["film"] = film->bytes();

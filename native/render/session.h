@@ -24,7 +24,8 @@ const char* state_name(SessionState);
 
 struct SessionProgress {
   SessionState state = SessionState::kIdle;
-  double fraction = 0.0, elapsed = 0.0, remaining = -1.0, error = -1.0;  // negative: not known
+  double fraction = 0.0, elapsed = 0.0, remaining = -1.0, noise = -1.0;  // negative: not known
+  bool exact = false;                                                    // the noise is the whole error
   uint32_t samples = 0;
   uint64_t generation = 0;
   std::string stage, failure;
@@ -36,7 +37,8 @@ struct SessionStatistics {
   double elapsed = 0.0;
   std::map<std::string, double> seconds, method_values;
   std::map<std::string, size_t> bytes;
-  BelievedError error;
+  BelievedError noise;
+  bool exact = false;  // the noise is the whole error: the method has no bias and shares nothing between samples
   std::vector<std::string> warnings;
   struct Pass {
     uint32_t first, count, step;
@@ -63,6 +65,8 @@ class Session {
   /// What the method remembers of the scene, into and out of a file; not while it renders (InvalidInput).
   void save_cache(const std::string& path) const;
   void load_cache(const std::string& path);
+  /// Drops what the method remembers: the next start() begins from nothing. Not while it renders (InvalidInput).
+  void forget_cache() const;
 
   SessionProgress progress() const;
   SessionStatistics statistics() const;
@@ -80,6 +84,7 @@ class Session {
   std::shared_ptr<const Image> shown() const;
 
  private:
+  void refuse_while_rendering() const;
   void keep_cache(const std::string& path, bool load) const;
   void stop_thread();
   void launch();

@@ -29,13 +29,15 @@ InstanceMask local_view_mask(const Scene& scene, const std::vector<uint32_t>& ha
 
 }  // namespace
 
+void Session::refuse_while_rendering() const {
+  const std::lock_guard lock(mutex_);
+  if (state_ == SessionState::kRunning || state_ == SessionState::kPaused)
+    throw InvalidInput("a cache is saved, loaded or dropped while nothing renders: wait() or cancel() first");
+}
+
 void Session::keep_cache(const std::string& path, bool load) const {
   const std::lock_guard control(control_);
-  {
-    const std::lock_guard lock(mutex_);
-    if (state_ == SessionState::kRunning || state_ == SessionState::kPaused)
-      throw InvalidInput("a cache is saved and loaded while nothing renders: wait() or cancel() first");
-  }
+  refuse_while_rendering();
   const std::shared_lock lock(scene_->use);
   std::unique_ptr<Renderer> renderer = Renderer::take(*scene_, settings_.method);
   try {
@@ -49,6 +51,12 @@ void Session::keep_cache(const std::string& path, bool load) const {
 
 void Session::save_cache(const std::string& path) const { keep_cache(path, false); }
 void Session::load_cache(const std::string& path) { keep_cache(path, true); }
+
+void Session::forget_cache() const {
+  const std::lock_guard control(control_);
+  refuse_while_rendering();
+  Renderer::take(*scene_, settings_.method).reset();
+}
 
 void Session::render_passes(const RenderSettings& settings, Renderer& renderer, Film& film) {
   Work work{.stop = StopToken(&stop_),
@@ -89,14 +97,14 @@ void Session::render_passes(const RenderSettings& settings, Renderer& renderer, 
     uint64_t samples = 0;
     for (const PixelRequest& request : requests) samples += sample_count(request);
     if (samples >= kSamplesToTime && !paused_) sample_seconds_ = seconds / double(samples);
-    BelievedError error;
+    BelievedError noise;
     if (plan.step == 1 && (error_is_due(done) || (done >= 2 && done >= settings.samples)))
-      error = film.believed_error();
+      noise = film.believed_error();
     {
       const std::lock_guard lock(mutex_);
       film_step_ = plan.step;
       statistics_.samples = done;
-      if (error.value >= 0.0f) statistics_.error = error;
+      if (noise.value >= 0.0f) statistics_.noise = noise;
       statistics_.seconds["render"] = in_passes;
       for (const auto& [name, value] : renderer.statistics().values) statistics_.method_values[name] = value;
       if (statistics_.passes.size() < 4096) statistics_.passes.push_back({plan.first, plan.count, plan.step, seconds});
@@ -112,7 +120,7 @@ void Session::render_passes(const RenderSettings& settings, Renderer& renderer, 
         at_last_publish = now();
       }
     }
-    if (settings.accuracy > 0.0f && error_may_stop(done) && error.value >= 0.0f && error.value <= settings.accuracy)
+    if (settings.accuracy > 0.0f && error_may_stop(done) && noise.value >= 0.0f && noise.value <= settings.accuracy)
       break;
   }
   if (!stop_ && settings.denoise && done && !settings.viewport) publish(settings, film, 1, true);

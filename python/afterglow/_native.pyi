@@ -232,9 +232,12 @@ class Session:
         """What the method remembers of the scene, into a file; InvalidInput while it renders or where there is nothing."""
     def load_cache(self, path: str) -> None:
         """The same from a file, for the next start(); InvalidInput where the file is of another scene."""
+    def forget_cache(self) -> None:
+        """Drops what the method remembers of the scene, so that the next start() begins from nothing."""
     def progress(self) -> dict[str, Any]:
         """state "idle"|"running"|"paused"|"finished"|"cancelled"|"failed", fraction, samples, remaining (s, None unknown),
-        elapsed, stage, error (believed relative error or None), generation (grows with every new readable result)"""
+        elapsed, stage, error (believed relative error; None: not known, or the method has a bias, which no spread shows),
+        noise (what the samples spread by), generation (grows with every new readable result)"""
     def passes(self) -> list[str]: ...
     def read(self, name: str = "combined", out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
         """(height, width, channels) of the region, row 0 at the bottom; readable at any time, never stops the render.
@@ -243,7 +246,8 @@ class Session:
         transmission_indirect transmission_color emission environment albedo denoise_normal sample_count
         error (standard error of the mean, luminance), batches (16 batch means of luminance)"""
     def statistics(self) -> dict[str, Any]:
-        """method, samples, seconds by stage (sync aside), rays by kind, believed_error, error_low/high, bytes, dropped
+        """method, samples, seconds by stage (sync aside), rays by kind, believed_error, error_low/high (None for a method with a
+        bias: it has `noise` alone, what its samples spread by), noise, bytes, dropped
         (non-finite values), warnings, passes_log, threads, effects, denoiser"""
 
 def method_descriptions() -> list[dict[str, Any]]:

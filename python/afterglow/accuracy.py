@@ -44,8 +44,10 @@ class Point:
     trimmed: float
     ms_ssim: float
     flip: float
-    believed: float | None
+    believed: float | None  # None: the method has a bias, which no spread of samples shows
+    noise: float | None
     samples: float
+    accuracy: float  # that was asked for; 0: exactly these samples
     in_use: bool = False
 
 
@@ -86,9 +88,10 @@ class ProceduralRenderer:
         self.key = {"scene": name, "resolution": self.resolution}
 
     def render(self, **settings: Any) -> tuple[np.ndarray, float, dict[str, Any]]:
-        from . import render
+        from . import Session, render
 
         width, height = self.resolution
+        Session(self.built.scene, {"method": settings["method"]}).forget_cache()  # a frame is timed from nothing
         result = render(self.built, width=width, height=height, **settings)
         return result.image, result.seconds, result.statistics
 
@@ -174,14 +177,17 @@ def reference(renderer: Renderer, samples: int, say: Callable[[str], None]) -> t
 
 
 def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, repeats: int, budget: float,
-            say: Callable[[str], None]) -> list[Point]:
-    """Every setting `repeats` times with another seed; a method's dearer settings are left out once one took over `budget` s."""
+            say: Callable[[str], None], begin: Callable[[int, Setting], None] = lambda number, setting: None) -> list[Point]:
+    """Every setting `repeats` times with another seed; a method's dearer settings are left out once one took over `budget` s.
+    begin: called with the number of each setting before it is rendered."""
     whole, points, spent = parts.mean(0), [], {}
-    for setting in settings:
+    for number, setting in enumerate(settings):
+        begin(number, setting)
         values = dict(setting.values)
         method = setting.method.split(" ")[0]
-        growth = values.get("samples", 0) / max(1, spent.get(setting.method, (0, 1))[1])
-        if spent.get(setting.method, (0.0, 1))[0] * max(1.0, growth) > budget:
+        effort = float(values.get("samples") or 1.0 / values["accuracy"])
+        took, before = spent.get(setting.method, (0.0, effort))
+        if took * max(1.0, effort / before) > budget:
             say(f"{setting.method} {setting.name}: left out, it would take more than {budget:g} s")
             continue
         errors, bars, seconds, shown, statistics = [], [], [], None, {}
@@ -192,14 +198,15 @@ def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, 
             bars.append(estimate.error)
             seconds.append(took)
             shown = image
-        spent[setting.method] = (min(seconds), values.get("samples", 0))
+        spent[setting.method] = (min(seconds), effort)
         spread = float(np.std(errors, ddof=1) / math.sqrt(repeats)) if repeats > 1 else 0.0
         assert shown is not None
         points.append(Point(
             setting.method, setting.name, float(np.median(seconds)), float(np.mean(errors)),
             math.hypot(spread, float(np.mean(bars))),
             metrics.trimmed_relmse(shown, whole), metrics.ms_ssim(shown, whole) if min(shown.shape[:2]) >= 11 else float("nan"),
-            metrics.flip(shown, whole), statistics.get("believed_error"), float(statistics.get("samples") or 0)))
+            metrics.flip(shown, whole), statistics.get("believed_error"), statistics.get("noise"),
+            float(statistics.get("samples") or 0), float(values["accuracy"])))
         last = points[-1]
         say(f"{setting.method:24} {setting.name:14} {last.seconds:8.2f} s  relMSE {last.error:.5f} ± {last.error_bar:.5f}")
     return points
@@ -224,15 +231,22 @@ def run(file: str, *, percent: int = 100, samples: int = 4096, repeats: int = 2,
 
 
 def mark_in_use(report: Report, settings: dict[str, Any]) -> None:
-    """Marks the point nearest to the settings that a .blend file has: same method, nearest sample count."""
+    """Marks the point nearest to the settings that are in use: same method; of a caching one the nearest accuracy, of the path
+    tracer the nearest count of samples, which an accuracy above 0 makes fewer."""
     if not settings:
         return
     method = settings.get("method", "AUTO")
     name = ("PATH_TRACING" if method == "AUTO" else method) + (" + OIDN" if settings.get("denoise") else "")
     same = [p for p in report.points if p.method == name]
-    if same:
-        wanted = max(1, settings.get("samples", 1))
-        min(same, key=lambda p: abs(math.log(max(1.0, p.samples) / wanted))).in_use = True
+    if not same:
+        return
+    accuracy, wanted = settings.get("accuracy", 0.0), max(1, settings.get("samples", 1))
+    if same[0].accuracy > 0:
+        min(same, key=lambda p: abs(math.log(p.accuracy / max(accuracy, 1e-6)))).in_use = True
+        return
+    if accuracy > 0 and same[-1].believed:
+        wanted = max(1, min(wanted, same[-1].samples * (same[-1].believed / accuracy) ** 2))
+    min(same, key=lambda p: abs(math.log(max(1.0, p.samples) / wanted))).in_use = True
 
 
 def to_svg(report: Report) -> str:
@@ -248,11 +262,11 @@ def to_svg(report: Report) -> str:
 
 
 def to_table(report: Report) -> str:
-    rows = [("method", "setting", "seconds", "relMSE", "±", "trimmed", "MS-SSIM", "FLIP", "believed")]
+    rows = [("method", "setting", "seconds", "relMSE", "±", "trimmed", "MS-SSIM", "FLIP", "believed", "noise")]
     for p in report.points:
-        believed = "–" if p.believed is None else f"{p.believed:.4f}"
+        believed, noise = ("–" if value is None else f"{value:.4f}" for value in (p.believed, p.noise))
         rows.append((p.method + (" *" if p.in_use else ""), p.setting, f"{p.seconds:.2f}", f"{p.error:.5f}", f"{p.error_bar:.5f}",
-                     f"{p.trimmed:.5f}", f"{p.ms_ssim:.4f}", f"{p.flip:.4f}", believed))
+                     f"{p.trimmed:.5f}", f"{p.ms_ssim:.4f}", f"{p.flip:.4f}", believed, noise))
     return chart.table(rows)
 
 

@@ -10,7 +10,7 @@ import pytest
 from afterglow import bench, blenders, cache
 from afterglow.bench.figure import Context, Figure, Pairs, alternate, table
 from afterglow.bench.foundation.kitchen import fewest
-from afterglow.bench.foundation.light_passes import compare, describe
+from afterglow.bench.foundation.light_passes import DIVIDED, compare, describe, light_of, resolved
 from afterglow.bench.foundation.sync import staged
 
 
@@ -167,3 +167,28 @@ def test_the_first_image_of_a_new_state_is_seen_through_noise() -> None:
         assert viewport.new_share(before, after, shown(new, samples, grid)) > 0.5
     with pytest.raises(ValueError, match="too little"):
         viewport.new_share(before, shown(old, 16, 1), before)
+
+
+@pytest.mark.parametrize("names", [("Diffuse Color", "Diffuse Direct", "Diffuse Indirect", "Emission"),
+                                   ("DiffCol", "DiffDir", "DiffInd", "Emit")])
+def test_a_pass_counts_as_the_light_that_it_brings(names: tuple[str, ...]) -> None:
+    """Multiplied by its colour pixel by pixel, under the names of old and new Blenders."""
+    color, direct, indirect, emission = (np.random.default_rng(i).random((4, 5, 3)).astype(np.float32) for i in range(4))
+    combined = color * (direct + indirect) + emission
+    passes = dict(zip(names, (color, direct, indirect, emission)))
+    found = light_of({"combined": np.dstack([combined, combined[..., :1]]), **passes})
+    assert found["combined"] == pytest.approx(found["Diffuse Direct"] + found["Diffuse Indirect"] + found["Emission"], rel=1e-6)
+    assert found["Diffuse Direct" + DIVIDED] == pytest.approx(direct.mean(), rel=1e-6)
+    assert "Environment" not in found and "Glossy Direct" not in found
+
+
+def test_a_divided_pass_is_judged_where_its_noise_allows() -> None:
+    rng = np.random.default_rng(1)
+
+    def values(mean: float, noise: float) -> np.ndarray:
+        return mean + noise * rng.standard_normal(16)
+
+    theirs = {"combined": values(1, 1e-4), "Diffuse Direct" + DIVIDED: values(1, 1e-4)}
+    assert compare({"combined": theirs["combined"], "Diffuse Direct" + DIVIDED: values(1.03, 1e-4)}, theirs)[0] > 1
+    worst, _, details = compare({"combined": theirs["combined"], "Diffuse Direct" + DIVIDED: values(1.5, 0.3)}, theirs)
+    assert worst < 1e-3 and resolved(details) and details["Diffuse Direct" + DIVIDED]["resolved"] > 1

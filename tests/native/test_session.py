@@ -327,3 +327,35 @@ def test_a_viewport_starts_as_coarse_as_the_machine_needs_and_ends_with_the_same
         pictures.append(s.read())
     assert first[0] == 8 and first[1] <= 32
     np.testing.assert_array_equal(*pictures)
+
+
+@pytest.mark.parametrize("method", ["INSTANT_RADIOSITY", "INSTANT_CACHE", "HASH_CACHE"])
+def test_methods_with_a_bias_tell_noise_and_believe_no_error(method: str) -> None:
+    _, s = session(method=method, samples=32, width=24, height=24)
+    s.start()
+    s.wait()
+    p, t = s.progress(), s.statistics()
+    assert t["believed_error"] is None and t["error_low"] is None and t["error_high"] is None and p["error"] is None
+    assert t["noise"] > 0 and p["noise"] == pytest.approx(t["noise"])
+    _, exact = session(samples=32, width=24, height=24)
+    exact.start()
+    exact.wait()
+    assert exact.statistics()["noise"] == exact.statistics()["believed_error"]
+
+
+@pytest.mark.parametrize("method", ["INSTANT_CACHE", "HASH_CACHE"])
+def test_a_forgotten_cache_is_filled_anew(method: str) -> None:
+    """The same render twice gives the same picture once the cache is dropped; with the cache left there it need not."""
+    _, s = session(method=method, samples=2, width=24, height=24)
+    s.start()
+    with pytest.raises(afterglow.InvalidInput, match="wait"):
+        s.forget_cache()
+    s.wait()
+    first, made = s.read(), s.statistics()["values"]
+    s.forget_cache()
+    s.start()
+    s.wait()
+    np.testing.assert_array_equal(s.read(), first)
+    again = s.statistics()["values"]
+    for name in ("records", "cells"):
+        assert again.get(name) == made.get(name)

@@ -199,6 +199,23 @@ class AFTERGLOW_RENDER_PT_statistics(PropertiesPanel, bpy.types.Panel):
             wrap(layout, text, "ERROR")
 
 
+def simplify_panels() -> list[type]:
+    """Blender's own Simplify panels once more: panels stand in the order in which they were registered, and Blender's would
+    be above Sampling."""
+    made = []
+    for name in ("", "_viewport", "_render", "_greasepencil"):
+        original = getattr(bpy.types, "RENDER_PT_simplify" + name, None)
+        if original is None:
+            continue
+        content = {"bl_label": original.bl_label, "bl_options": {"DEFAULT_CLOSED"}, "draw": original.draw}
+        if name:
+            content["bl_parent_id"] = "AFTERGLOW_RENDER_PT_simplify"
+        if hasattr(original, "draw_header"):
+            content["draw_header"] = original.draw_header
+        made.append(type("AFTERGLOW_RENDER_PT_simplify" + name, (PropertiesPanel, bpy.types.Panel), content))
+    return made
+
+
 def statistics_lines(statistics: dict) -> list[tuple[str, str]]:
     """What a render did, as rows of a name and a value."""
     lines = [
@@ -211,6 +228,8 @@ def statistics_lines(statistics: dict) -> list[tuple[str, str]]:
         lines.append(
             ("Error", f"{error:.2%}" + (f" ({low:.2%} to {high:.2%})" if low is not None and high is not None else ""))
         )
+    elif statistics.get("noise") is not None:
+        lines.append(("Noise", f"{statistics['noise']:.2%}, its bias aside"))
     lines.append(("Time", f"{statistics.get('wall_time', 0.0):.2f} s"))
     for stage, seconds in (statistics.get("seconds") or {}).items():
         lines.append(("  " + stage.replace("_", " ").title(), f"{seconds:.3f} s"))
@@ -240,6 +259,7 @@ classes = (
     AFTERGLOW_RENDER_PT_clamping,
     AFTERGLOW_RENDER_PT_caustics,
     AFTERGLOW_RENDER_PT_film,
+    *simplify_panels(),
     AFTERGLOW_RENDER_PT_performance,
     AFTERGLOW_RENDER_PT_statistics,
 )

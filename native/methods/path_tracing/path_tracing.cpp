@@ -21,7 +21,7 @@ constexpr std::array<Kernel, sizeof...(kIndices)> kernel_table(std::index_sequen
 
 class PathTracing final : public IndirectMethod {
  public:
-  MethodTraits traits() const override { return {.terms = kAllTerms}; }
+  MethodTraits traits() const override { return {.terms = kAllTerms, .exact = true}; }
 
   void configure(const Settings& settings) override { settings_.configure(settings); }
 
