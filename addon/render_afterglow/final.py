@@ -33,6 +33,9 @@ PREVIEW_SETTINGS = {
 }
 
 
+FORGETFUL = {"AUTO", "PATH_TRACING", "INSTANT_RADIOSITY"}  # methods that start anew in every frame
+
+
 class RefusedError(Exception):
     """What Afterglow does not do; the text goes to the user as it is."""
 
@@ -71,7 +74,8 @@ def render_layer(
     started = time.perf_counter()
     prefix = f"Layer '{layer}' | " if len(scene.view_layers) > 1 and not engine.is_preview else ""
     engine.update_stats("", prefix + "Reading the scene")
-    persistent = scene.render.use_persistent_data and not engine.is_preview
+    remembers = engine.is_animation and scene.afterglow.method not in FORGETFUL
+    persistent = (scene.render.use_persistent_data or remembers) and not engine.is_preview
     native = store.kept(scene, layer) if persistent else None
     if native is None:
         native = NativeScene()
@@ -87,7 +91,7 @@ def render_layer(
     if engine.test_break():
         return
     wanted = list(passes.wanted(depsgraph.view_layer)) if not engine.is_preview else [passes.COMBINED]
-    if bpy.app.background and not persistent and not engine.is_preview:
+    if bpy.app.background and not scene.render.use_persistent_data and not engine.is_preview:
         # All is read. Blender's evaluated copies are as large as ours; in the interface they are still wanted.
         engine.free_blender_memory()
         del depsgraph

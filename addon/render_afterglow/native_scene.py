@@ -26,12 +26,17 @@ class NativeScene:
         else:
             print("Afterglow:", text)
 
-    def sync_with(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Makes the native scene equal to the depsgraph; everything is read again where it is another one than
-        before."""
+    def sync_with(self, depsgraph: bpy.types.Depsgraph, view: bpy.types.SpaceView3D | None = None) -> None:
+        """Makes the native scene equal to the depsgraph, as a view shows it. Everything is read again where it is another
+        depsgraph than before, or where edits may have been missed since; what then turns out to be the same changes
+        nothing, so that the methods keep what they remember."""
         address = depsgraph.as_pointer()
-        self.sync.sync(depsgraph, full=address != self.depsgraph)
+        self.sync.sync(depsgraph, view=view, full=address != self.depsgraph)
         self.depsgraph = address
+
+    def rest(self) -> None:
+        """From now on edits are missed: the next sync reads everything."""
+        self.depsgraph = 0
 
     def take_warnings(self) -> list[str]:
         taken, self.warnings[:] = list(dict.fromkeys(self.warnings)), []

@@ -2,8 +2,9 @@
 """What outlives a RenderEngine object, keyed by scene: Blender makes a new engine object for every frame and mode
 switch.
 
-Native scenes of final renders stay here between the frames of an animation when "Persistent Data" is on; statistics and
-the last good image of each layer stay until another file is opened.
+Native scenes, and with them what the methods remember of them, stay here: those of final renders between the frames of an
+animation when "Persistent Data" is on or the method is one that remembers; those of viewports while no viewport uses them.
+Statistics and the last good image of each layer stay until another file is opened.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from . import backend
 
 # (scene's name, layer's name) → the native scene with what was read into it
 _kept: dict[tuple[str, str], Any] = {}
+# (scene's name, layer's name) → native scenes of viewports that were closed, for the next one that opens
+_resting: dict[tuple[str, str], list[Any]] = {}
 # scene's name → layer's name → statistics of the last render
 _statistics: dict[str, dict[str, dict[str, Any]]] = {}
 # (scene's name, layer's name) → pass name → pixels of the last image that was rendered without an error
@@ -42,6 +45,22 @@ def forget(scene: bpy.types.Scene) -> None:
     key = scene_key(scene)
     for name in [name for name in _kept if name[0] == key]:
         del _kept[name]
+
+
+def take_resting(key: tuple[str, str]) -> Any | None:
+    """The native scene that the viewport closed last left, for a viewport alone; None: there is none."""
+    resting = _resting.get(key)
+    return resting.pop() if resting else None
+
+
+def leave_resting(key: tuple[str, str], native: Any) -> None:
+    """Keeps a closed viewport's native scene. One a layer: they are as large as the scene."""
+    native.rest()
+    _resting[key] = [native]
+
+
+def view_key(depsgraph: bpy.types.Depsgraph) -> tuple[str, str]:
+    return scene_key(depsgraph.scene), depsgraph.view_layer.name
 
 
 def record_statistics(scene: bpy.types.Scene, layer: str, statistics: dict[str, Any]) -> None:
@@ -71,6 +90,7 @@ def last_image(scene: bpy.types.Scene, layer: str) -> dict[str, np.ndarray] | No
 
 def clear() -> None:
     _kept.clear()
+    _resting.clear()
     _statistics.clear()
     forget_records = getattr(backend.afterglow, "forget_statistics", None)
     if forget_records is not None:
@@ -83,12 +103,48 @@ def clear_for_file(_path: object = None, *_rest: object) -> None:
     clear()
 
 
+@persistent
+def clear_resting(_path: object = None, *_rest: object) -> None:
+    """Viewports of the file before are closed only while the next one is read."""
+    _resting.clear()
+
+
+@persistent
+def forget_unused(scene: bpy.types.Scene, *_rest: object) -> None:
+    """After an edit: nothing rests for a scene that another engine renders now, or that is gone."""
+    if not _resting:
+        return
+    wanted = {scene_key(it) for it in bpy.data.scenes if it.render.engine == "AFTERGLOW"}
+    for key in [key for key in _resting if key[0] not in wanted]:
+        del _resting[key]
+
+
+@persistent
+def end_of_render(scene: bpy.types.Scene, *_rest: object) -> None:
+    """After the last frame: what was kept between the frames for the method's sake alone goes."""
+    if not scene.render.use_persistent_data:
+        forget(scene)
+
+
+def _handlers() -> tuple[tuple[list[Any], Any], ...]:
+    handlers = bpy.app.handlers
+    return (
+        (handlers.load_pre, clear_for_file),
+        (handlers.load_post, clear_resting),
+        (handlers.depsgraph_update_post, forget_unused),
+        (handlers.render_complete, end_of_render),
+        (handlers.render_cancel, end_of_render),
+    )
+
+
 def register() -> None:
-    if clear_for_file not in bpy.app.handlers.load_pre:
-        bpy.app.handlers.load_pre.append(clear_for_file)
+    for handlers, handler in _handlers():
+        if handler not in handlers:
+            handlers.append(handler)
 
 
 def unregister() -> None:
-    if clear_for_file in bpy.app.handlers.load_pre:
-        bpy.app.handlers.load_pre.remove(clear_for_file)
+    for handlers, handler in _handlers():
+        if handler in handlers:
+            handlers.remove(handler)
     clear()

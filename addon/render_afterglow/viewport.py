@@ -16,7 +16,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import backend, display
+from . import backend, display, store
 from .native_scene import NativeScene
 from .properties.scene import mist_settings, session_settings
 from .sync import CameraView, sync_camera_view
@@ -119,6 +119,7 @@ class Viewport:
 
     def __init__(self, engine: bpy.types.RenderEngine) -> None:
         self.native: NativeScene | None = None
+        self.key = ("", "")  # under which the native scene rests when this viewport is closed
         self.session: Any = None
         self.picture: display.Picture | None = None
         self.generation = -1
@@ -135,12 +136,16 @@ class Viewport:
         self.watcher.start()
 
     def free(self) -> None:
-        """Stops everything; Blender calls nothing afterwards."""
+        """Stops everything; Blender calls nothing afterwards. The native scene rests, with all that methods remember of
+        it, until a viewport of the same layer opens."""
         self.watcher.stop()
         session, self.session = self.session, None
+        native, self.native = self.native, None
         if session is not None:
             session.cancel()
-        self.native = self.picture = None
+            if native is not None:
+                store.leave_resting(self.key, native)
+        self.picture = None
 
     # Edits ----------------------------------------------------------------------------------------------------------
 
@@ -160,7 +165,8 @@ class Viewport:
 
     def _update(self, engine: Any, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         if self.native is None:
-            self.native = NativeScene()
+            self.key = store.view_key(depsgraph)
+            self.native = store.take_resting(self.key) or NativeScene()
         self.shown = None
         if self.session is None:
             self._sync(context, depsgraph)
@@ -181,7 +187,7 @@ class Viewport:
         self.awaited, self.waited = self.session.progress()["generation"], False
 
     def _sync(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
-        self.native.sync.sync(depsgraph, view=context.space_data)
+        self.native.sync_with(depsgraph, context.space_data)
         self.shading = viewport_shading(context.space_data)
 
     def _start(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
@@ -288,11 +294,7 @@ class Viewport:
         scale_y = context.region.height / self.view.height
         if self.picture is not None:
             self.picture.draw(x0 * scale_x, y0 * scale_y, width * scale_x, height * scale_y)
-        engine.update_stats("Afterglow", view_status(self._method(), progress))
-
-    def _method(self) -> str:
-        """The method that runs, which is the engine's choice where the setting says so."""
-        return str(self.session.statistics()["method"] or self.settings["method"])
+        engine.update_stats("Afterglow", view_status(self.session.statistics(), progress))
 
     def fail(self, engine: Any, text: str) -> None:
         """Tells what is wrong in the viewport's status; the last picture stays."""
@@ -316,14 +318,28 @@ def same_camera(one: dict[str, Any], other: dict[str, Any]) -> bool:
     return all(np.array_equal(one[name], other[name]) for name in one)
 
 
-def view_status(method: str, progress: dict[str, Any]) -> str:
-    """The viewport's status line: method, samples, believed error, time."""
-    parts = [method.replace("_", " ").title(), f"{progress['samples']} samples"]
+def view_status(statistics: dict[str, Any], progress: dict[str, Any]) -> str:
+    """The viewport's status line: method, samples, believed error, what the cache holds and did, time."""
+    parts = [str(statistics["method"]).replace("_", " ").title(), f"{progress['samples']} samples"]
     if progress.get("error") is not None:
         parts.append(f"error {progress['error']:.1%}")
     elif progress.get("noise") is not None:
         parts.append(f"noise {progress['noise']:.1%}")
+    parts += cache_status(statistics)
     parts.append(f"{progress['elapsed']:.1f} s")
     if progress["state"] == "paused":
         parts.append("paused")
     return " | ".join(parts)
+
+
+def cache_status(statistics: dict[str, Any]) -> list[str]:
+    """What a method that keeps records did at the last edit, in words."""
+    values = statistics["values"]
+    if "records" not in values:
+        return []
+    counts = [f"{int(values['records']):,} records"]
+    for name, word in (("records_new", "new"), ("records_updated", "updated"), ("records_dropped", "dropped")):
+        if values.get(name):
+            counts.append(f"{int(values[name]):,} {word}")
+    rays = values.get("visibility_rays_now")
+    return [", ".join(counts)] + ([f"{int(rays):,} visibility rays"] if rays else [])

@@ -9,8 +9,11 @@
 
 namespace afterglow {
 
-Renderer::Renderer(const std::string& method)
-    : id_(method == "AUTO" ? "PATH_TRACING" : method), method_(make_method(id_)) {}
+std::string Renderer::chosen(const std::string& method, bool viewport) {
+  return method != "AUTO" ? method : viewport ? "INSTANT_CACHE" : "PATH_TRACING";
+}
+
+Renderer::Renderer(const std::string& method) : id_(chosen(method, false)), method_(make_method(id_)) {}
 
 std::unique_ptr<Renderer> Renderer::take(const CommittedScene& scene, const std::string& method) {
   auto renderer = std::make_unique<Renderer>(method);

@@ -14,7 +14,10 @@ namespace afterglow {
 
 class Renderer {
  public:
-  /// AUTO: what suits the scene. Throws InvalidInput for an unknown method.
+  /// What AUTO means: the instant cache where somebody waits for every edit, the path tracer in final renders. Other
+  /// names stay as they are.
+  static std::string chosen(const std::string& method, bool viewport);
+  /// AUTO: as in final renders. Throws InvalidInput for an unknown method.
   explicit Renderer(const std::string& method);
   /// The one that a render of the scene by this method left behind, with its caches, or a new one.
   static std::unique_ptr<Renderer> take(const CommittedScene&, const std::string& method);

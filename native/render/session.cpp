@@ -243,7 +243,7 @@ void Session::run(RenderSettings settings) {
   std::string text;
   try {
     const std::shared_lock use(scene_->use);
-    std::unique_ptr<Renderer> kept = Renderer::take(*scene_, settings.method);
+    std::unique_ptr<Renderer> kept = Renderer::take(*scene_, Renderer::chosen(settings.method, settings.viewport));
     Renderer& renderer = *kept;
     Settings method_settings = settings.method_settings;
     method_settings.emplace_back("accuracy", double(settings.accuracy));

@@ -39,7 +39,7 @@ void Session::keep_cache(const std::string& path, bool load) const {
   const std::lock_guard control(control_);
   refuse_while_rendering();
   const std::shared_lock lock(scene_->use);
-  std::unique_ptr<Renderer> renderer = Renderer::take(*scene_, settings_.method);
+  std::unique_ptr<Renderer> renderer = Renderer::take(*scene_, Renderer::chosen(settings_.method, settings_.viewport));
   try {
     load ? renderer->load(*scene_, path) : renderer->save(*scene_, path);
   } catch (...) {

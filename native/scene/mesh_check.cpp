@@ -234,4 +234,26 @@ MeshRepairs check_deformed(Mesh& mesh, const std::vector<DroppedTriangle>& dropp
   return repairs;
 }
 
+MeshDifference mesh_difference(const Mesh& a, const Mesh& b) {
+  const auto same = [](const auto& x, const auto& y) {
+    return x.size() == y.size() && (x.empty() || !std::memcmp(x.data(), y.data(), x.size() * sizeof(x[0])));
+  };
+  const auto same_uv = [&](const UvMap& x, const UvMap& y) { return x.name == y.name && same(x.values, y.values); };
+  const auto same_attribute = [&](const Attribute& x, const Attribute& y) {
+    return x.name == y.name && x.domain == y.domain && x.width == y.width && same(x.values, y.values);
+  };
+  const bool topology =
+      a.name == b.name && a.positions.size() == b.positions.size() &&
+      a.previous_positions.empty() == b.previous_positions.empty() &&
+      a.corner_normals.size() == b.corner_normals.size() && a.vertex_normals.size() == b.vertex_normals.size() &&
+      a.active_uv == b.active_uv && a.active_color == b.active_color && same(a.triangles, b.triangles) &&
+      same(a.corners, b.corners) && same(a.smooth, b.smooth) && same(a.slots, b.slots) && same(a.faces, b.faces) &&
+      std::equal(a.uvs.begin(), a.uvs.end(), b.uvs.begin(), b.uvs.end(), same_uv) &&
+      std::equal(a.attributes.begin(), a.attributes.end(), b.attributes.begin(), b.attributes.end(), same_attribute);
+  if (!topology) return MeshDifference::kOther;
+  const bool shape = same(a.positions, b.positions) && same(a.previous_positions, b.previous_positions) &&
+                     same(a.corner_normals, b.corner_normals) && same(a.vertex_normals, b.vertex_normals);
+  return shape ? MeshDifference::kNone : MeshDifference::kShape;
+}
+
 }  // namespace afterglow

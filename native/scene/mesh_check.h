@@ -26,4 +26,8 @@ MeshRepairs check_mesh(Mesh&);
 /// The same for new positions and normals of a mesh whose topology stays: first puts back what was dropped before.
 MeshRepairs check_deformed(Mesh&, const std::vector<DroppedTriangle>& dropped_before);
 
+/// How far a checked mesh differs from another one.
+enum class MeshDifference : uint8_t { kNone, kShape /* places and normals of the same triangles */, kOther };
+MeshDifference mesh_difference(const Mesh&, const Mesh&);
+
 }  // namespace afterglow

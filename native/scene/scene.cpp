@@ -74,8 +74,20 @@ Handle Scene::add_mesh(Mesh mesh) {
 void Scene::set_mesh(Handle handle, Mesh mesh) {
   MeshRow& row = state_->meshes.at(handle);
   MeshRepairs repairs = check_mesh(mesh);
-  row = {std::move(mesh), std::move(repairs.dropped)};
-  state_->pending.note(ChangeSet::kMesh, handle, ChangeSet::kEdited);
+  const bool whole = repairs.dropped.empty() && row.dropped.empty();
+  // Who gives a mesh anew without knowing whether it changed invalidates nothing that it did not.
+  const MeshDifference difference = whole ? mesh_difference(row.mesh, mesh) : MeshDifference::kOther;
+  if (difference == MeshDifference::kShape) {
+    row.mesh.positions.assign(mesh.positions.begin(), mesh.positions.end());  // in place: the BVH knows this address
+    row.mesh.previous_positions = std::move(mesh.previous_positions);
+    row.mesh.corner_normals = std::move(mesh.corner_normals);
+    row.mesh.vertex_normals = std::move(mesh.vertex_normals);
+    row.mesh.bounds = mesh.bounds;
+    state_->pending.note(ChangeSet::kMesh, handle, ChangeSet::kDeformed);
+  } else if (difference == MeshDifference::kOther) {
+    row = {std::move(mesh), std::move(repairs.dropped)};
+    state_->pending.note(ChangeSet::kMesh, handle, ChangeSet::kEdited);
+  }
   for (std::string& text : repairs.warnings) state_->pending.warnings.push_back(std::move(text));
 }
 

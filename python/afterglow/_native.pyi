@@ -213,7 +213,8 @@ class Session:
     def __init__(self, scene: Scene, settings: Mapping[str, Any]) -> None:
         """settings, all optional:
         width, height: full image; region (x0, y0, x1, y1) in pixels, x1/y1 exclusive, row 0 at the bottom
-        method "AUTO"|"PATH_TRACING"|…; samples; accuracy (0: exactly `samples`); time_limit; seed; frame; threads (0: all)
+        method "AUTO" (INSTANT_CACHE in viewports, else PATH_TRACING)|"PATH_TRACING"|…; samples;
+        accuracy (0: exactly `samples`); time_limit; seed; frame; threads (0: all)
         max_bounces diffuse_bounces glossy_bounces transmission_bounces transparent_max_bounces
         sample_clamp_direct sample_clamp_indirect (0: off) caustics_reflective caustics_refractive
         pixel_filter "BLACKMAN_HARRIS"|"GAUSSIAN"|"BOX", filter_width; film_transparent; film_exposure

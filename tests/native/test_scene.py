@@ -432,3 +432,26 @@ def test_memory_is_told(ag) -> None:
     scene.commit()
     told = scene.bytes
     assert told["meshes"] >= SQUARE.nbytes + TWO.nbytes and told["instances"] > 0 and told["bvh"] > 0
+
+
+def test_a_mesh_given_anew_invalidates_no_more_than_what_changed(ag) -> None:
+    scene = ag.Scene()
+    rng = np.random.default_rng(3)
+    arrays: dict[str, Any] = dict(
+        positions=rng.random((30, 3), dtype=np.float32), triangles=np.arange(30, dtype=np.int32).reshape(10, 3),
+        uvs={"map": rng.random((30, 2), dtype=np.float32)}, active_uv="map", materials=np.arange(10) % 2)
+    mesh = scene.add_mesh(name="rag", **arrays)
+    scene.add_instances(mesh, np.eye(4)[None], name="rag")
+    scene.commit()
+
+    def changes_of(**given: Any) -> set[str]:
+        version = scene.version
+        scene.set_mesh(mesh, name="rag", **{**arrays, **given})
+        scene.commit()
+        return {name for name, value in scene.changes_since(version).items() if value and name != "version"}
+
+    assert changes_of() == set()
+    assert changes_of(positions=arrays["positions"] + np.float32(0.1)) == {"meshes_deformed", "instances_deformed"}
+    assert changes_of(positions=arrays["positions"] + np.float32(0.1)) == set()
+    assert changes_of(uvs={"map": 1 - arrays["uvs"]["map"]}) == {"meshes_replaced"}
+    assert changes_of(materials=np.zeros(10, int)) == {"meshes_replaced"}

@@ -166,7 +166,7 @@ def test_accuracy_stops_at_the_error_asked_for() -> None:
 
 
 def test_viewport_shows_whole_images_from_the_first_on() -> None:
-    _built, s = session(samples=24, viewport=True)
+    _built, s = session(samples=24, viewport=True, method="PATH_TRACING")
     s.start()
     seen: list[tuple[int, np.ndarray]] = []
     while not s.wait(0.001):
@@ -315,7 +315,7 @@ def test_recorded_rays_are_those_of_the_render() -> None:
 
 
 def test_a_viewport_starts_as_coarse_as_the_machine_needs_and_ends_with_the_same_picture() -> None:
-    _, s = session(samples=4, viewport=True, width=400, height=300)
+    _, s = session(samples=4, viewport=True, width=400, height=300, method="PATH_TRACING")
     pictures, first = [], []
     for _ in range(2):  # the second start knows what a sample takes
         s.start()

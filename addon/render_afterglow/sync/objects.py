@@ -271,7 +271,8 @@ class ObjectTable:
 
     def _update_meshes(self) -> dict[int, MeshEntry]:
         """The mesh at each address that the walk has met: as it was, read anew, or new."""
-        by_address = {entry.address: entry for entry in self.meshes.values()}
+        # Another depsgraph may have another mesh at the same address: what everything is read for goes by its users.
+        by_address = {} if self.updates.everything else {entry.address: entry for entry in self.meshes.values()}
         result: dict[int, MeshEntry] = {}
         claimed = {id(by_address[address]) for address in self.uses if address in by_address}
         for address, use in self.uses.items():

@@ -47,6 +47,9 @@ class Cache {
   size_t size() const { return records_.size(); }
   size_t bytes() const;
   size_t record_bytes() const;
+  /// As bytes (empty: there is nothing to save), and in place of what is remembered; InvalidInput for others' bytes.
+  std::vector<char> save(const CommittedScene&) const;
+  void load(const CommittedScene&, std::span<const char>);
 
  private:
   void reset(const CommittedScene&);
@@ -69,7 +72,8 @@ class Cache {
   }
 
   CacheSettings settings_;
-  bool stale_ = true;  // nothing that is kept may be used
+  bool stale_ = true;    // nothing that is kept may be used
+  bool loaded_ = false;  // came from a file: the lights have to be compared
   Spacing spacing_;
   LightEmission emission_;
   VirtualLightColumns lights_;

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <utility>
 
 #include "base/parallel.h"
 #include "methods/instant_cache/cache.h"
@@ -78,7 +79,8 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   SceneChanges seen = changes;
   seen.camera = false;
   counts_.updated = counts_.reused = counts_.moved = counts_.created = 0;
-  if (!all && seen.empty()) {
+  const bool compares = std::exchange(loaded_, false);
+  if (!all && !compares && seen.empty()) {
     counts_.reused = records_.size();
     std::vector<uint32_t> waiting;  // an earlier update was interrupted
     for (uint32_t i = 0; i < records_.size(); ++i)

@@ -47,6 +47,8 @@ class InstantCache final : public IndirectMethod {
     for (size_t i = 0; i < points.size(); ++i) answers[i] = cache_.answer(points[i]);
   }
 
+  std::vector<char> save(const CommittedScene& scene) const override { return cache_.save(scene); }
+  void load(const CommittedScene& scene, std::span<const char> bytes) override { cache_.load(scene, bytes); }
   void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&) override {}
 
   MethodStatistics statistics() const override {

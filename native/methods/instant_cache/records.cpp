@@ -3,6 +3,7 @@
 #include "methods/instant_cache/records.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "rays/surface_point.h"
 
@@ -94,6 +95,30 @@ void VisibilityTable::set(size_t row, uint32_t slot, const Rgb& visibility) {
 bool VisibilityTable::could_brighten(size_t row, uint32_t slot) const {
   if (!could_darken(row, slot)) return true;
   return coloured_ && transmittance_[row * slots_ + slot] != 0xffff;
+}
+
+void VisibilityTable::write(std::vector<char>& bytes) const {
+  const auto append = [&](const auto& values, size_t count) {
+    const char* at = reinterpret_cast<const char*>(values.data());
+    bytes.insert(bytes.end(), at, at + count * sizeof(values[0]));
+  };
+  append(seen_, rows_ * words_), append(unknown_, rows_ * words_);
+  if (coloured_) append(transmittance_, rows_ * slots_);
+}
+
+void VisibilityTable::read(size_t rows, const char* from) {
+  rows_ = rows;
+  const auto take = [&](auto& values, size_t count) {
+    values.resize(count);
+    if (count) std::memcpy(values.data(), from, count * sizeof(values[0]));
+    from += count * sizeof(values[0]);
+  };
+  take(seen_, rows_ * words_), take(unknown_, rows_ * words_);
+  if (coloured_) take(transmittance_, rows_ * slots_);
+  if (slots_ % 64)
+    for (size_t row = 0; row < rows_; ++row)  // no bit beyond the slots, whatever the file says
+      for (std::vector<uint64_t>* bits : {&seen_, &unknown_})
+        (*bits)[(row + 1) * words_ - 1] &= (uint64_t(1) << (slots_ % 64)) - 1;
 }
 
 size_t VisibilityTable::bytes() const {

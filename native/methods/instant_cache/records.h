@@ -59,6 +59,9 @@ class VisibilityTable {
   bool could_darken(size_t row, uint32_t slot) const { return seen(row)[slot / 64] >> (slot % 64) & 1; }
   bool could_brighten(size_t row, uint32_t slot) const;
   size_t bytes() const;
+  /// All rows as they are, to the end of a file's bytes; and rows from there, over what reset() made.
+  void write(std::vector<char>&) const;
+  void read(size_t rows, const char*);
   size_t row_bytes() const { return words_ * 16 + (coloured_ ? slots_ * 2 : 0); }
 
  private:

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Caches in Blender: the viewport's own choice of a method, and what it remembers over edits, switches of the view and frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Run = Callable[..., dict[str, Any]]
+
+
+def test_the_viewport_keeps_its_cache_over_switches_and_edits(in_window: Run, blend_files: Path) -> None:
+    found = in_window(
+        """
+        s = scene()
+        s.afterglow.method = 'AUTO'
+        s.afterglow.preview_accuracy, s.afterglow.preview_samples = 0.0, 4
+        s.render.preview_pixel_size = '2'
+        box = s.objects['Tall']
+        lamp = s.objects['Lamp']
+        seen = []
+
+        def look(name):
+            statistics = viewport().session.statistics()
+            values = statistics['values']
+            seen.append({'name': name, 'method': statistics['method'], **{key: values[key] for key in (
+                'resets', 'records', 'records_moved', 'objects_moved', 'lights_moved', 'lights_recoloured')}})
+            return view_picture().copy()
+
+        def steps():
+            space = full_view(); yield 1.0
+            yield from settled(); first = look('first')
+            box.location.x += 0.2; yield 0.1
+            yield from settled(); moved = look('moved')
+            lamp.data.energy *= 2; yield 0.1
+            yield from settled(); brighter = look('brighter')
+            space.shading.type = 'SOLID'; yield 0.3
+            box.location.x -= 0.2
+            lamp.data.energy /= 2; yield 0.2
+            space.shading.type = 'RENDERED'; yield 0.3
+            yield from settled(); back = look('back')
+            space.shading.type = 'SOLID'; yield 0.3
+            addon('store')._resting.clear()
+            space.shading.type = 'RENDERED'; yield 0.3
+            yield from settled(); fresh = look('fresh')
+            result(seen=seen, moved=np.abs(moved - first).mean(), brighter=(brighter - moved).mean(),
+                   back=np.abs(back - first).mean(), fresh=np.abs(back - fresh).mean())
+        drive(steps)
+        """,
+        blend_files / "cornell_box.blend",
+    )
+    first, moved, brighter, back, fresh = found["seen"]
+    assert first["method"] == "INSTANT_CACHE"
+    assert [it["resets"] for it in found["seen"]] == [1, 1, 1, 1, 1]
+    assert moved["objects_moved"] == 1 and moved["records_moved"] > 10
+    assert brighter["objects_moved"] == 0 and brighter["lights_moved"] == 0 and brighter["lights_recoloured"] > 50
+    assert back["objects_moved"] == 1 and back["records"] >= first["records"]
+    assert found["moved"] > 0.005 and found["brighter"] > 0.02
+    assert found["back"] < 0.005 and found["fresh"] < 0.005, found
+    assert "Traceback" not in found["output"], found["output"][-3000:]
+
+
+def test_frames_of_an_animation_share_a_cache(in_blender: Run, blend_files: Path) -> None:
+    found = in_blender(
+        """
+        import os
+        s = scene(96, 72, samples=1, method='INSTANT_CACHE')
+        box = s.objects['Tall']
+        for frame in (1, 2, 3):
+            box.location.x += 0.1
+            box.keyframe_insert('location', frame=frame)
+        s.frame_start, s.frame_end = 1, 3
+        s.render.filepath = os.path.join(os.path.dirname(os.environ['AFTERGLOW_RESULT']), 'frame_')
+        seen = []
+        store = addon('store')
+        bpy.app.handlers.render_post.append(lambda *_: seen.append(store.statistics(s)['values']))
+        bpy.ops.render.render(animation=True)
+        result(resets=[v['resets'] for v in seen], moved=[v['objects_moved'] for v in seen], kept=len(store._kept))
+        """,
+        blend_files / "cornell_box.blend",
+    )
+    assert found["resets"] == [1, 1, 1]
+    assert found["moved"][1:] == [1, 1]
+    assert found["kept"] == 0
