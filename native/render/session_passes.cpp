@@ -55,7 +55,7 @@ void Session::load_cache(const std::string& path) { keep_cache(path, true); }
 void Session::forget_cache() const {
   const std::lock_guard control(control_);
   refuse_while_rendering();
-  Renderer::take(*scene_, settings_.method).reset();
+  Renderer::take(*scene_, Renderer::chosen(settings_.method, settings_.viewport)).reset();
 }
 
 void Session::render_passes(const RenderSettings& settings, Renderer& renderer, Film& film) {
