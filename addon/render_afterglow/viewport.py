@@ -178,6 +178,9 @@ class Viewport:
                 self._set_view(context, depsgraph)
                 self.native.scene.commit("still")
             self.watcher.wake()
+        self._tell_warnings()
+
+    def _tell_warnings(self) -> None:
         for text in self.native.take_warnings():
             print("Afterglow:", text)
 
@@ -202,6 +205,8 @@ class Viewport:
         """The view and the session's settings, as they are now in Blender."""
         scene, region, space = depsgraph.scene, context.region, context.space_data
         view = sync_camera_view(depsgraph, region, context.region_data, space, 1.0 / pixel_size(scene))
+        for text in view.warnings:
+            self.native.sync.warn(text)
         settings = session_settings(scene, viewport=True)
         settings.update(
             width=view.width,
@@ -231,6 +236,7 @@ class Viewport:
                     self.session.update(changed)
                 self.native.scene.commit("still")
             self.watcher.wake()
+            self._tell_warnings()
         self._pause(depsgraph.scene.afterglow.preview_pause)
 
     def _local_view(self, space: bpy.types.SpaceView3D, depsgraph: bpy.types.Depsgraph) -> list[int] | None:

@@ -163,6 +163,21 @@ void add_glossy(const Operands& in, const Common& c) {
   push_lobe(c.surface, lobe);
 }
 
+/// Rough glass before Blender 4.0: reflection and refraction apart, shared by the Fresnel of the smooth surface.
+void split_glass(Surface& surface, Lobe lobe, const Vec3& outgoing) {
+  const float share = fresnel_dielectric(saturate(glm::dot(lobe.normal, outgoing)), lobe.ior);
+  const Rgb weight = lobe.weight, reflected = lobe.f0, refracted = lobe.f90;
+  lobe.fresnel = Fresnel::kNone;
+  lobe.f0 = lobe.f90 = Rgb(1.0f);
+  for (const bool through : {false, true}) {
+    lobe.kind = through ? LobeKind::kMicrofacetRefraction : LobeKind::kMicrofacetReflection;
+    lobe.pass = through ? LobeClass::kTransmission : LobeClass::kGlossy;
+    lobe.weight = weight * (through ? refracted * (1.0f - share) : reflected * share);
+    lobe.sampling_weight = mean(lobe.weight);
+    if (lobe.sampling_weight > 0.0f) push_lobe(surface, lobe);
+  }
+}
+
 /// weight, colour, normal, roughness, ior; distribution, version
 void add_glass(const Operands& in, const Common& c, bool refraction_only) {
   const bool no_reflection = refraction_only || (c.hit.path && c.hit.path->drop_glossy);
@@ -191,6 +206,8 @@ void add_glass(const Operands& in, const Common& c, bool refraction_only) {
   set_distribution(lobe, in.u(5), in.u(6));
   lobe.one_pass = in.u(5) == 1 && in.u(6) == 1;
   lobe.sampling_weight = mean(lobe.weight) * std::fmax(mean(c.color), 1e-3f);
+  if (lobe.kind == LobeKind::kMicrofacetGlass && in.u(6) == 1 && in.u(5) != 1 && lobe.alpha_x > 0.0f)
+    return split_glass(c.surface, lobe, c.point.outgoing);
   push_lobe(c.surface, lobe);
 }
 

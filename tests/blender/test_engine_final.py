@@ -353,11 +353,20 @@ def test_what_cannot_be_rendered_is_left_out_with_a_warning_that_names_it(in_ble
         cube.data.vertices[0].co = (float('nan'),) * 3; look('mesh'); cube.data.vertices[0].co = kept
         cube.scale = (0, 0, 0); look('transform'); cube.scale = (1, 1, 1)
         cube.is_shadow_catcher = True
+        camera = s.camera.data
+        camera.type = 'PANO'
+        (camera if hasattr(camera, 'panorama_type') else camera.cycles).panorama_type = 'FISHEYE_EQUIDISTANT'
+        glass = cube.active_material.node_tree
+        absorption = glass.nodes.new('ShaderNodeVolumeAbsorption')
+        output = next(n for n in glass.nodes if n.type == 'OUTPUT_MATERIAL')
+        hull = glass.links.new(absorption.outputs[0], output.inputs['Volume'])
         bpy.context.view_layer.use_pass_cryptomatte_object = True
         tree = s.world.node_tree
         volume = tree.nodes.new('ShaderNodeVolumeScatter')
         tree.links.new(volume.outputs[0], next(n for n in tree.nodes if n.type == 'OUTPUT_WORLD').inputs['Volume'])
         look('unsupported')
+        camera.type = 'PERSP'
+        glass.links.remove(hull)
         broken = os.path.join(os.path.dirname(os.environ['AFTERGLOW_RESULT']), 'broken.png')
         with open(broken, 'wb') as file: file.write(b'\\x89PNG\\r\\n\\x1a\\nno picture')
         for name, path in (('broken', broken), ('missing', broken + '.no')):
@@ -374,8 +383,9 @@ def test_what_cannot_be_rendered_is_left_out_with_a_warning_that_names_it(in_ble
     said = {name: "\n".join(texts) for name, texts in found["warned"].items()}
     assert "Light" in said["light"] and "left out" in said["light"]
     assert "Cube" in said["mesh"] and "Cube" in said["transform"]
-    for words in ("shadow catcher", "Cryptomatte", "World 'World'"):
+    for words in ("shadow catcher", "Cryptomatte", "World 'World'", "Camera 'Camera'", "(object 'Cube'): volumes"):
         assert words in said["unsupported"], said
+    assert all("'" in text or '"' in text for texts in found["warned"].values() for text in texts), "a warning without a name"
     assert "broken" in said["broken"] and "missing" in said["missing"]
     for red, green, blue, _ in found["magenta"]:
         assert min(red, blue) > 3 * green, found

@@ -33,9 +33,11 @@ def test_registers_and_leaves_nothing(in_blender: Run) -> None:
         """
     )
     assert found["with_it"]["scene"] and "AFTERGLOW" in found["with_it"]["engines"]
-    assert {"DATA_PT_lens", "RENDER_PT_color_management", "AFTERGLOW_RENDER_PT_sampling"} <= set(
-        found["with_it"]["panels"]
-    )
+    panels = found["with_it"]["panels"]
+    assert {"DATA_PT_lens", "RENDER_PT_color_management", "AFTERGLOW_RENDER_PT_sampling"} <= set(panels)
+    # Blender shows panels as they were registered, and its own Simplify would stand above Sampling
+    assert "RENDER_PT_simplify" not in panels
+    assert panels.index("AFTERGLOW_RENDER_PT_simplify") > panels.index("AFTERGLOW_RENDER_PT_sampling")
     assert not found["without"]["scene"] and not found["without"]["handlers"]
     assert [name for name in found["without"]["panels"] if not name.startswith("AFTERGLOW")] == []
     assert found["again"]["scene"] and sorted(found["again"]["panels"]) == sorted(found["with_it"]["panels"])

@@ -136,6 +136,61 @@ def test_edits_are_seen_in_the_next_picture(in_window: Run, box: Path) -> None:
 
 
 @pytest.mark.slow
+def test_animated_and_driven_properties_are_seen(in_window: Run) -> None:
+    """A material that asks for properties of objects, meshes and worlds; a driver on one, whose object nobody tells of."""
+    found = in_window(
+        """
+        s = scene()
+        s.afterglow.preview_accuracy, s.afterglow.preview_samples = 0.0, 4
+        s.render.preview_pixel_size = '8'
+        cube, light = bpy.data.objects['Cube'], bpy.data.objects['Light']
+        material = bpy.data.materials.new('Shining')
+        material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        output, emission, asked = (tree.nodes.new('ShaderNode' + kind) for kind in ('OutputMaterial', 'Emission', 'Attribute'))
+        tree.links.new(asked.outputs['Fac'], emission.inputs['Strength'])
+        tree.links.new(emission.outputs[0], output.inputs[0])
+        asked.attribute_name = 'glow'
+        cube.data.materials.clear(); cube.data.materials.append(material)
+        seen = {}
+        def level():
+            picture = view_picture()
+            h, w = picture.shape[:2]
+            return float(picture[h // 2 - 30:h // 2 + 30, w // 2 - 30:w // 2 + 30].mean())
+        def look(name):
+            yield 0.2
+            yield from settled()
+            seen.setdefault(name, []).append(level())
+        def steps():
+            full_view(); yield 1.0
+            for name, owner, kind in (('object', cube, 'OBJECT'), ('mesh', cube.data, 'OBJECT'), ('world', s.world, 'VIEW_LAYER')):
+                asked.attribute_type = kind
+                for frame in (1, 11):
+                    owner['glow'] = frame / 10 - 0.1
+                    owner.keyframe_insert('["glow"]', frame=frame)
+                for frame in (1, 11):
+                    s.frame_set(frame)
+                    yield from look(name)
+                owner.animation_data_clear()
+                del owner['glow']
+            asked.attribute_type = 'OBJECT'
+            cube['glow'] = 0.0
+            driver = cube.driver_add('["glow"]').driver
+            variable = driver.variables.new()
+            variable.targets[0].id, variable.targets[0].data_path = light, 'location.x'
+            driver.expression = variable.name + ' / 4'
+            for x in (0.0, 4.0):
+                light.location.x = x
+                yield from look('driver')
+            result(seen=seen)
+        drive(steps)
+        """
+    )
+    assert all(dark < 0.1 and bright > 0.5 for dark, bright in found["seen"].values()), found["seen"]
+
+
+@pytest.mark.slow
 def test_local_view_border_and_pixel_size(in_window: Run) -> None:
     found = in_window(
         """

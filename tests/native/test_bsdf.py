@@ -23,6 +23,7 @@ SMOOTH = {
     "metal_physical": graph("metallic_bsdf", {"fresnel": "physical_conductor", "distribution": "ggx"}, roughness=0.6),
     "glass": graph("glass_bsdf", {"distribution": "ggx"}, color=WHITE, roughness=0.6, ior=1.5),
     "glass_multi": graph("glass_bsdf", {"distribution": "multi_ggx"}, color=WHITE, roughness=0.8, ior=1.5),
+    "glass_1": graph("glass_bsdf", {"distribution": "ggx", "version": 1}, color=WHITE, roughness=0.6, ior=1.5),
     "refraction": graph("refraction_bsdf", color=WHITE, roughness=0.6, ior=1.3),
     "principled": graph("principled", base_color=WHITE, roughness=0.6),
     "principled_metal": graph("principled", base_color=WHITE, metallic=1.0, roughness=0.7),
@@ -42,7 +43,7 @@ BRIGHTENS = {"principled_1"}  # as Blender before 4.0 does: sheen and clearcoat 
 @pytest.mark.parametrize("direction", DIRECTIONS)
 @pytest.mark.parametrize("backfacing", [False, True])
 def test_samples_follow_the_density(name: str, direction: str, backfacing: bool) -> None:
-    if backfacing and name not in ("glass", "refraction", "principled_glass"):
+    if backfacing and name not in ("glass", "glass_1", "refraction", "principled_glass"):
         pytest.skip("only refraction knows its sides")
     probability = chi_square(SMOOTH[name], DIRECTIONS[direction], backfacing=backfacing)
     assert probability > 1e-4, f"χ² test: a chance of {probability:.2g} that samples follow the density"

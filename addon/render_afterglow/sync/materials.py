@@ -64,7 +64,7 @@ class MaterialTable:
     warn: Callable[[str], None]
     table: dict[int, Material] = field(default_factory=dict)   # address of the original material
     images: dict[Any, Image] = field(default_factory=dict)     # (address of the original image, path of the frame)
-    attributes_changed: bool = False                           # a known material asks meshes for others than before
+    attributes_changed: bool = False                           # a known material may ask objects for others than before
     moving: set[int] = field(default_factory=set)              # materials that read an object's matrix
     _dirty: set[int] = field(default_factory=set)
     _everything: bool = False
@@ -93,6 +93,7 @@ class MaterialTable:
         self._dirty = set(updates.materials)
         if not self._everything and not self._dirty and not self.moving:
             return
+        self.attributes_changed = any(address < 0 for address in self.table)  # variants are compiled as objects are walked
         for original in bpy.data.materials:
             for address in (original.as_pointer(), original.as_pointer() + HOLLOW):
                 if address in self.table and (self._everything or original.as_pointer() in self._dirty or address in self.moving):

@@ -126,6 +126,8 @@ class ObjectTable:
         self.uses: dict[int, MeshUse] = {}
         self.next_lights: set[GroupKey] = set()
         self.override = getattr(layer, "material_override", None)
+        if self.materials.personal:  # what moved may drive a property that a material asks for, and nobody tells of that
+            updates.only_moved = False
         only_moved = updates.only_moved and not (updates.everything or self.materials.attributes_changed)
         if only_moved and self._move(updates.moved):
             return

@@ -63,10 +63,11 @@ def _cornell_room(name: str, lamp: str = "area") -> Description:
     return scene
 
 
-def _blocks(scene: Description, tall: str = "white", low: str = "white") -> None:
+def _blocks(scene: Description, tall: str = "white", low: str = "white", gap: float = 0.0) -> None:
+    """gap: between the floor and the low block, whose top stays where it is."""
     for name, material, place, angle, size in (
         ("Tall", tall, (-0.35, 0.3, 0.0), 0.3, (0.58, 0.58, 1.2)),
-        ("Low", low, (0.35, -0.35, 0.0), -0.29, (0.58, 0.58, 0.58)),
+        ("Low", low, (0.35, -0.35, gap), -0.29, (0.58, 0.58, 0.58 - gap)),
     ):
         transform = translate(place) @ rotate(angle) @ scale(size) @ translate((0, 0, 0.5))
         scene.add(name, box(), material, transform=transform)
@@ -93,8 +94,8 @@ def cornell_box(variant: str = "diffuse", lights: int = 64) -> Description:
     elif variant == "glass":
         scene.materials["glass"] = node("glass_bsdf", {"distribution": "ggx"}, color=(1, 1, 1), roughness=0.0, ior=1.5)
         scene.materials["frosted"] = node("glass_bsdf", {"distribution": "ggx"}, color=(0.8, 0.95, 0.9), roughness=0.3, ior=1.45)
-        _blocks(scene)
-        scene.objects[-1].materials = ("frosted",)
+        # From inside, a face in the plane of the floor would be met before or behind it by chance.
+        _blocks(scene, low="frosted", gap=0.01)
         scene.add("Ball", sphere(0.3, 64, 32), "glass", transform=translate((0.4, -0.35, 0.89)))
         scene.add("Tall ball", sphere(0.25, 64, 32), "glass", transform=translate((-0.35, 0.3, 1.46)))
     elif variant == "textured":
