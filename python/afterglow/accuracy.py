@@ -249,14 +249,24 @@ def mark_in_use(report: Report, settings: dict[str, Any]) -> None:
     min(same, key=lambda p: abs(math.log(max(1.0, p.samples) / wanted))).in_use = True
 
 
+def line_name(point: Point) -> str:
+    """What a chart calls the line of a point's method."""
+    return point.method.replace("_", " ").title().replace("Oidn", "OIDN") + (", by accuracy" if point.accuracy > 0 else "")
+
+
+def label(point: Point) -> str:
+    """A point's setting in few letters."""
+    return f"{point.accuracy:g}" if point.accuracy > 0 else point.setting
+
+
 def to_svg(report: Report) -> str:
     """The chart: seconds against relMSE, a line a method."""
     lines = []
     for method in dict.fromkeys(p.method for p in report.points):
         points = [p for p in report.points if p.method == method]
         marked = next((i for i, p in enumerate(points) if p.in_use), None)
-        lines.append(chart.Line(method, [(p.seconds, p.error) for p in points], [p.error_bar for p in points],
-                                [p.setting for p in points], marked))
+        lines.append(chart.Line(line_name(points[0]), [(p.seconds, p.error) for p in points], [p.error_bar for p in points],
+                                [label(p) for p in points], marked))
     width, height = report.resolution
     return chart.lines(f"{report.scene}, {width}×{height}", lines, "seconds for the whole frame", "relMSE against the reference")
 

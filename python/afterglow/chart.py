@@ -59,6 +59,26 @@ class Axis:
         return self.start + min(max(share, -0.02), 1.02) * (self.end - self.start)
 
 
+class Labels:
+    """Finds each label a place beside its point where it covers no other and no point; what finds none is left out."""
+
+    SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1))
+
+    def __init__(self, points: Sequence[tuple[float, float]], radius: float) -> None:
+        self.radius = radius
+        self.taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in points]
+
+    def place(self, x: float, y: float, width: float, height: float) -> tuple[float, float] | None:
+        """The label's middle for the point (x, y)."""
+        for right, up in self.SIDES:
+            at_x, at_y = x + right * (self.radius + 2 + width / 2), y + up * (self.radius + 2 + height / 2)
+            box = (at_x - width / 2, at_y - height / 2, at_x + width / 2, at_y + height / 2)
+            if not any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in self.taken):
+                self.taken.append(box)
+                return at_x, at_y
+        return None
+
+
 def number(value: float) -> str:
     """Short, with as many digits as it takes."""
     if value == 0:
@@ -116,6 +136,7 @@ def lines(title: str, series: Sequence[Line], x_name: str, y_name: str, log: tup
     body.append(_text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 14, x_name))
     middle = (TOP + HEIGHT - BOTTOM) / 2
     body.append(_text(16, middle, y_name, extra=f'transform="rotate(-90 16 {middle:.0f})"'))
+    labels = Labels([(x_axis.at(x), y_axis.at(y)) for line in series for x, y in line.points if x > 0 and y > 0], 5)
     for i, line in enumerate(series):
         color, marker = COLORS[i % len(COLORS)], MARKERS[i % len(MARKERS)]
         shown = [(j, x, y) for j, (x, y) in enumerate(line.points)
@@ -131,10 +152,11 @@ def lines(title: str, series: Sequence[Line], x_name: str, y_name: str, log: tup
             body.append(_marker(marker, px, py, color))
             if j == line.marked:
                 body.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="9" fill="none" stroke="{color}" stroke-width="2"/>')
-            if j < len(line.labels):
-                body.append(_text(px + 7, py - 6, line.labels[j], "start", 10, f'fill="{color}"'))
-        body.append(_marker(marker, WIDTH - RIGHT - 150, TOP + 14 + 16 * i, color))
-        body.append(_text(WIDTH - RIGHT - 140, TOP + 18 + 16 * i, line.name, "start"))
+            place = labels.place(px, py, 5.5 * len(line.labels[j]), 10) if j < len(line.labels) else None
+            if place is not None:
+                body.append(_text(place[0], place[1] + 3.5, line.labels[j], size=10, extra=f'fill="{color}"'))
+        body.append(_marker(marker, WIDTH - RIGHT - 200, TOP + 14 + 16 * i, color))
+        body.append(_text(WIDTH - RIGHT - 190, TOP + 18 + 16 * i, line.name, "start"))
     return _frame(title, body)
 
 

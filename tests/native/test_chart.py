@@ -38,3 +38,14 @@ def test_axis_ticks() -> None:
 def test_table_lines_up() -> None:
     text = chart.table([("a", "bb"), ("long", "c")])
     assert text.splitlines() == ["a     bb", "----  --", "long  c"]
+
+
+def test_labels_cover_nothing() -> None:
+    points = [(10.0 * i, 0.0) for i in range(6)]
+    labels = chart.Labels(points, 4)
+    places = [labels.place(x, y, 30, 10) for x, y in points]
+    kept = [p for p in places if p is not None]
+    assert 2 <= len(kept) < len(points), "some find a place above or below, the crowd leaves none to all"
+    for i, (x, y) in enumerate(kept):
+        assert all(abs(x - px) >= 15 + 4 or abs(y - py) >= 5 + 4 for px, py in points)
+        assert all(abs(x - a) >= 30 or abs(y - b) >= 10 for a, b in kept[:i])

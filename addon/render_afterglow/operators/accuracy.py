@@ -116,11 +116,14 @@ class Job:
 
 def chart_of(report: Any) -> chart.Chart:
     """The report as lines to draw."""
+    from importlib import import_module
+
+    accuracy = import_module(backend.afterglow.__name__ + ".accuracy")
     width, height = report.resolution
     it = chart.Chart(f"{report.scene}, {width} x {height}")
     for point in report.points:
-        it.lines.setdefault(point.method.replace("_", " ").title(), []).append(
-            chart.Point(point.seconds, point.error, point.error_bar, point.setting, point.in_use)
+        it.lines.setdefault(accuracy.line_name(point), []).append(
+            chart.Point(point.seconds, point.error, point.error_bar, accuracy.label(point), point.in_use)
         )
     return it
 

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+from .. import backend
+
 WIDTH, HEIGHT = 960, 640
 LEFT, RIGHT, BOTTOM, TOP = 90, 30, 70, 60
 BACKGROUND, GRID, INK = (0.12, 0.12, 0.13), (0.22, 0.22, 0.24), (0.85, 0.85, 0.85)
@@ -137,6 +139,11 @@ def draw(chart: Chart) -> np.ndarray:
     canvas.text(WIDTH / 2, HEIGHT - 32, chart.title, 18)
     canvas.text(WIDTH / 2, 16, "wall time of the whole frame")
     canvas.text(LEFT - 20, HEIGHT - TOP + 12, "error (relMSE)")
+    from importlib import import_module
+
+    labels = import_module(backend.afterglow.__name__ + ".chart").Labels(
+        [place(point.seconds, point.error) for point in points if point.seconds > 0 and point.error > 0], 6
+    )
     for number, (name, line) in enumerate(chart.lines.items()):
         colour = COLOURS[number % len(COLOURS)]
         line = sorted((p for p in line if p.error > 0 and p.seconds > 0), key=lambda p: p.seconds)
@@ -152,10 +159,11 @@ def draw(chart: Chart) -> np.ndarray:
             canvas.disk(x, y, 4.0, colour)
             if point.used:
                 canvas.disk(x, y, 10.0, INK, ring=2.0)
-            if point.label:
-                canvas.text(x, y + 12, point.label, 11)
+            where = labels.place(x, y, 7.0 * len(point.label), 11) if point.label else None
+            if where is not None:
+                canvas.text(where[0], where[1] - 4, point.label, 11)
         canvas.line(
-            WIDTH - 210, HEIGHT - TOP - 16 - 22 * number, WIDTH - 180, HEIGHT - TOP - 16 - 22 * number, colour, 3.0
+            WIDTH - 260, HEIGHT - TOP - 16 - 22 * number, WIDTH - 230, HEIGHT - TOP - 16 - 22 * number, colour, 3.0
         )
         canvas.text(WIDTH - 110, HEIGHT - TOP - 21 - 22 * number, name)
     canvas.write_texts()
