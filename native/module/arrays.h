@@ -15,7 +15,6 @@ struct Column {
   const char* data = nullptr;
   size_t rows = 0, width = 1, item = 4;
   py::ssize_t row_stride = 0, item_stride = 0;
-  bool given() const { return data != nullptr || keep; }
   bool contiguous() const {
     return item_stride == py::ssize_t(item) && (row_stride == py::ssize_t(item * width) || rows <= 1);
   }
@@ -30,6 +29,15 @@ Column flag_column(const py::handle& value, const std::string& what);
 
 /// Tells the system that this memory is about to be filled: page by page of 4 KB, filling costs more than copying.
 void expect_large_pages(void* data, size_t bytes);
+
+/// Copies every item of a column with gaps; the size is known to the compiler, so that no item costs a call.
+template <size_t kItem>
+void copy_items(const Column& column, char* to) {
+  for (size_t row = 0; row < column.rows; ++row) {
+    const char* from = column.data + py::ssize_t(row) * column.row_stride;
+    for (size_t k = 0; k < column.width; ++k, from += column.item_stride, to += kItem) std::memcpy(to, from, kItem);
+  }
+}
 
 /// The column's values as a vector of Out (whole rows, or single items).
 template <class Out>
@@ -47,11 +55,7 @@ std::vector<Out> take(const Column& column) {
   }
   out.resize(n);
   char* to = reinterpret_cast<char*>(out.data());
-  for (size_t row = 0; row < column.rows; ++row) {
-    const char* from = column.data + py::ssize_t(row) * column.row_stride;
-    for (size_t k = 0; k < column.width; ++k, from += column.item_stride, to += column.item)
-      std::memcpy(to, from, column.item);
-  }
+  column.item == 1 ? copy_items<1>(column, to) : copy_items<4>(column, to);
   return out;
 }
 

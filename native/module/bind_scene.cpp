@@ -69,8 +69,8 @@ py::dict commit(PyScene& self, py::object flatten) {
 
 Handle add_mesh(PyScene& self, const py::kwargs& arguments) {
   expect_keywords(arguments,
-                  {"name", "positions", "triangles", "corners", "corner_normals", "vertex_normals", "smooth", "faces",
-                   "materials", "uvs", "active_uv", "attributes", "active_color", "previous_positions"},
+                  {"name", "positions", "triangles", "corners", "corner_vertices", "corner_normals", "vertex_normals",
+                   "smooth", "faces", "materials", "uvs", "active_uv", "attributes", "active_color", "previous_positions"},
                   "add_mesh");
   if (!arguments.contains("name")) throw InvalidInput("add_mesh: name is missing");
   const EditLock lock(self);
@@ -91,8 +91,8 @@ void set_mesh(PyScene& self, Handle handle, const py::kwargs& arguments) {
     return;
   }
   expect_keywords(arguments,
-                  {"name", "positions", "triangles", "corners", "corner_normals", "vertex_normals", "smooth", "faces",
-                   "materials", "uvs", "active_uv", "attributes", "active_color", "previous_positions"},
+                  {"name", "positions", "triangles", "corners", "corner_vertices", "corner_normals", "vertex_normals",
+                   "smooth", "faces", "materials", "uvs", "active_uv", "attributes", "active_color", "previous_positions"},
                   "set_mesh");
   Mesh mesh = mesh_from_python(arguments, name);
   const py::gil_scoped_release free;

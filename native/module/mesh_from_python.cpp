@@ -68,7 +68,8 @@ bool all_equal_to(const std::vector<T>& values, T wanted) {
 }
 
 struct Columns {
-  Column positions, previous, triangles, corners, corner_normals, vertex_normals, smooth, faces, materials;
+  Column positions, previous, triangles, corners, corner_vertices, corner_normals, vertex_normals, smooth, faces,
+      materials;
   std::vector<std::pair<std::string, Column>> uvs;
   std::vector<AttributeColumn> attributes;
   std::string active_uv, active_color;
@@ -82,13 +83,16 @@ std::string text(const py::dict& arguments, const char* name) {
 Columns columns_from(const py::dict& arguments, const std::string& owner) {
   const auto array = [&](const char* name) { return argument(arguments, name); };
   const auto what = [&](const char* name) { return owner + ": " + name; };
-  for (const char* needed : {"positions", "triangles"})
-    if (array(needed).is_none()) throw InvalidInput(what(needed) + " are missing");
+  if (array("positions").is_none()) throw InvalidInput(what("positions") + " are missing");
+  const bool by_corners = !array("corner_vertices").is_none() && !array("corners").is_none();
+  if (array("triangles").is_none() && !by_corners)
+    throw InvalidInput(what("triangles") + " are missing, and so are corners with corner_vertices");
   Columns c;
   c.positions = float_column(array("positions"), what("positions"), 3);
   c.previous = float_column(array("previous_positions"), what("previous_positions"), 3);
   c.triangles = index_column(array("triangles"), what("triangles"), 3);
   c.corners = index_column(array("corners"), what("corners"), 3);
+  c.corner_vertices = index_column(array("corner_vertices"), what("corner_vertices"), 1);
   c.corner_normals = float_column(array("corner_normals"), what("corner_normals"), 3);
   c.vertex_normals = float_column(array("vertex_normals"), what("vertex_normals"), 3);
   c.smooth = flag_column(array("smooth"), what("smooth"));
@@ -108,6 +112,30 @@ Columns columns_from(const py::dict& arguments, const std::string& owner) {
   c.active_uv = text(arguments, "active_uv");
   c.active_color = text(arguments, "active_color");
   return c;
+}
+
+/// Triangles as they are given, or the vertices of their corners: beyond all vertices where there is no such corner.
+std::vector<uint32_t> take_triangles(const Columns& c) {
+  if (!c.corner_vertices.data) return take<uint32_t>(c.triangles);
+  std::vector<uint32_t> out = take<uint32_t>(c.corners);
+  const char* vertices = c.corner_vertices.data;
+  const size_t count = c.corner_vertices.rows;
+  const py::ssize_t stride = c.corner_vertices.row_stride;
+  parallel_blocks(out.size(), size_t(1) << 18, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      uint32_t vertex = kNone;
+      if (out[i] < count) std::memcpy(&vertex, vertices + py::ssize_t(out[i]) * stride, 4);
+      out[i] = vertex;
+    }
+  });
+  return out;
+}
+
+/// Whether anything is given by corner, so that it matters which ones a triangle has.
+bool reads_corners(const Columns& c) {
+  return c.corner_normals.rows || !c.uvs.empty() ||
+         std::any_of(c.attributes.begin(), c.attributes.end(),
+                     [](const AttributeColumn& a) { return a.domain == Domain::kCorner; });
 }
 
 void take_faces(Mesh& mesh, const Columns& c, const std::string& owner) {
@@ -139,15 +167,17 @@ Mesh mesh_of(const Columns& c, const std::string& name, const std::string& owner
   std::vector<std::function<void()>> copies = {
       [&] { mesh.positions = take<Vec3>(c.positions); },
       [&] { mesh.previous_positions = take<Vec3>(c.previous); },
-      [&] { mesh.triangles = take<uint32_t>(c.triangles); },
-      [&] { mesh.corners = take<uint32_t>(c.corners); },
+      [&] { mesh.triangles = take_triangles(c); },
+      [&] {
+        if (reads_corners(c)) mesh.corners = take<uint32_t>(c.corners);
+      },
       [&] { mesh.corner_normals = take<Vec3>(c.corner_normals); },
       [&] { mesh.vertex_normals = take<Vec3>(c.vertex_normals); }};
   for (size_t i = 0; i < c.uvs.size(); ++i) {
     if (c.uvs[i].first == c.active_uv) mesh.active_uv = uint32_t(i);
     copies.push_back([&, i] { mesh.uvs[i] = {c.uvs[i].first, take<Vec2>(c.uvs[i].second)}; });
   }
-  parallel_blocks(copies.size(), 1, c.triangles.rows < 20'000 ? 1 : 0, [&](size_t begin, size_t end) {
+  parallel_blocks(copies.size(), 1, std::max(c.triangles.rows, c.corners.rows) < 20'000 ? 1 : 0, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) copies[i]();
   });
   take_faces(mesh, c, owner);

@@ -3,9 +3,12 @@
 #include "scene/mesh_check.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
+#include <span>
 
 #include "base/errors.h"
+#include "base/parallel.h"
 
 namespace afterglow {
 
@@ -20,8 +23,11 @@ Lanes load(const float* p) {
   return v;
 }
 
+/// Items of long arrays that a thread looks at in one go; shorter ones are not worth waking another for.
+constexpr size_t kLong = size_t(1) << 18;
+
 /// True when all of n floats are finite: 0 × x is 0 for those alone.
-bool all_finite(const float* p, size_t n) {
+bool block_is_finite(const float* p, size_t n) {
   Lanes sum[4] = {};
   size_t i = 0;
   for (; i + 16 <= n; i += 16)
@@ -32,10 +38,18 @@ bool all_finite(const float* p, size_t n) {
   return rest == 0.0f;
 }
 
+bool all_finite(const float* p, size_t n) {
+  std::atomic<bool> finite{true};
+  parallel_blocks(n, kLong, [&](size_t begin, size_t end) {
+    if (!block_is_finite(p + begin, end - begin)) finite = false;
+  });
+  return finite;
+}
+
 bool all_finite(const std::vector<Vec3>& v) { return v.empty() || all_finite(&v[0].x, 3 * v.size()); }
 
 /// Bounds of finite vertices.
-Box bounds_of(const std::vector<Vec3>& positions) {
+Box bounds_of(std::span<const Vec3> positions) {
   Box box;
   size_t i = 0;
   if (positions.size() >= 4) {
@@ -59,6 +73,16 @@ Box bounds_of(const std::vector<Vec3>& positions) {
   return box;
 }
 
+Box bounds_of_all(std::span<const Vec3> positions) {
+  std::vector<Box> parts((positions.size() + kLong - 1) / kLong);
+  parallel_blocks(positions.size(), kLong, [&](size_t begin, size_t end) {
+    parts[begin / kLong] = bounds_of(positions.subspan(begin, end - begin));
+  });
+  Box box;
+  for (const Box& part : parts) box.extend(part);
+  return box;
+}
+
 std::string quoted(const Mesh& mesh) { return "mesh '" + mesh.name + "'"; }
 
 void expect_size(const Mesh& mesh, const std::string& array, size_t size, size_t wanted, bool optional = true) {
@@ -78,8 +102,14 @@ size_t corner_count(const Mesh& mesh) {
 }
 
 uint32_t largest(const std::vector<uint32_t>& v) {
+  std::vector<uint32_t> parts((v.size() + kLong - 1) / kLong, 0);
+  parallel_blocks(v.size(), kLong, [&](size_t begin, size_t end) {
+    uint32_t m = 0;
+    for (size_t i = begin; i < end; ++i) m = std::max(m, v[i]);
+    parts[begin / kLong] = m;
+  });
   uint32_t m = 0;
-  for (const uint32_t x : v) m = std::max(m, x);
+  for (const uint32_t part : parts) m = std::max(m, part);
   return m;
 }
 
@@ -168,7 +198,7 @@ void check_positions(Mesh& mesh, MeshRepairs& repairs) {
                                " (first: index " + std::to_string(first) + "); " +
                                counted(repairs.dropped.size() - before, "triangle") + " left out");
   }
-  mesh.bounds = bounds_of(mesh.positions);
+  mesh.bounds = bounds_of_all(mesh.positions);
 }
 
 /// A non-finite normal becomes 0, which surface_point takes as "use the face's".

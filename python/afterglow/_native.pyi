@@ -132,16 +132,18 @@ class Scene:
     def set_material(self, material: int, graph: Graph, **kwargs: Any) -> None: ...
     def remove_material(self, material: int) -> None: ...
 
-    def add_mesh(self, *, name: str, positions: NDArray[np.float32], triangles: NDArray[np.int32] | NDArray[np.uint32],
-                 corners: NDArray[Any] | None = None, corner_normals: NDArray[np.float32] | None = None,
+    def add_mesh(self, *, name: str, positions: NDArray[np.float32],
+                 triangles: NDArray[np.int32] | NDArray[np.uint32] | None = None, corners: NDArray[Any] | None = None,
+                 corner_vertices: NDArray[Any] | None = None, corner_normals: NDArray[np.float32] | None = None,
                  vertex_normals: NDArray[np.float32] | None = None, smooth: NDArray[np.bool_] | None = None,
                  faces: NDArray[Any] | None = None, materials: NDArray[Any] | None = None,
                  uvs: Mapping[str, NDArray[np.float32]] | None = None, active_uv: str = "",
                  attributes: Mapping[str, tuple[str, NDArray[Any]]] | None = None, active_color: str = "",
                  previous_positions: NDArray[np.float32] | None = None) -> int:
         """positions (V, 3); triangles (T, 3) vertex indices; corners (T, 3) indices into the per-corner arrays (None: 3t+k);
-        corner_normals (C, 3) or vertex_normals (V, 3), object space (None: flat where not smooth); faces (T,) face of each
-        triangle (None: itself); smooth (F,) and materials (F,) slot of each face; uvs name → (C, 2);
+        corner_vertices (C,) the vertex of each corner, with corners in place of triangles; corner_normals (C, 3) or
+        vertex_normals (V, 3), object space (None: flat where not smooth); faces (T,) face of each triangle (None: itself);
+        smooth (F,) and materials (F,) slot of each face; uvs name → (C, 2);
         attributes name → ("vertex"|"corner"|"face"|"mesh", (N, 1–4) float32 or uint8 colours, sRGB-encoded bytes as
         scene-linear floats only). Non-finite vertices and index errors: the mesh renders without the triangles that hold
         them, and a warning names it."""

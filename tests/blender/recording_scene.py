@@ -83,6 +83,8 @@ class RecordingScene:
 
     # meshes
     def check_mesh(self, mesh):
+        if mesh.get("triangles") is None:
+            mesh["triangles"] = mesh["corner_vertices"][mesh["corners"]]
         corners = mesh["triangles"] if mesh["corners"] is None else mesh["corners"]
         assert mesh["triangles"].shape == corners.shape and corners.shape[1] == 3
         assert mesh["positions"].ndim == 2 and mesh["triangles"].max() < len(mesh["positions"]) and mesh["triangles"].min() >= 0
@@ -116,7 +118,7 @@ class RecordingScene:
 
     def set_mesh(self, mesh, **arguments):
         self.calls.append("set_mesh")
-        if "triangles" in arguments:
+        if "triangles" in arguments or "corner_vertices" in arguments:
             self.check_mesh(arguments)
             self.meshes[mesh] = self.copied(arguments)
         else:

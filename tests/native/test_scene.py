@@ -62,6 +62,39 @@ def test_strided_and_other_typed_arrays_are_the_same_mesh(ag) -> None:
         assert hit["triangle"][0] == 1 and hit["distance"][0] == 10.0
 
 
+@pytest.mark.parametrize("side", [1, 400])  # 400: long enough for several threads
+def test_triangles_may_be_given_by_corners(ag, side: int) -> None:
+    """Quads as Blender has them: corners in order of faces, two triangles a face."""
+    y, x = np.mgrid[0 : side + 1, 0 : side + 1].astype(np.float32)
+    points = np.stack([x.ravel(), y.ravel(), np.zeros(x.size, np.float32)], -1)
+    first = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    vertices = np.stack([first, first + 1, first + side + 2, first + side + 1], -1).ravel().astype(np.int32)
+    corners = (4 * np.arange(side * side)[:, None] + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3).astype(np.int32)
+    wide = np.zeros((len(vertices), 2), np.int32)
+    wide[:, 0] = vertices
+    scene, expected = ag.Scene(), ag.Scene()
+    expected.add_instances(expected.add_mesh(name="m", positions=points, triangles=vertices[corners]), at(), name="o")
+    for given in (vertices, wide[:, 0]):
+        mesh = scene.add_mesh(name="m", positions=points, corners=corners, corner_vertices=given)
+        scene.add_instances(mesh, at(z=-2.0 if given is vertices else 0.0), name="o")
+    assert scene.commit()["warnings"] == [] == expected.commit()["warnings"]
+    for ax, ay in np.random.default_rng(1).random((50, 2)) * side:
+        found, wanted = down(scene, ax, ay), down(expected, ax, ay)
+        assert all(found[key][0] == wanted[key][0] for key in ("triangle", "distance"))
+
+
+def test_corners_without_a_vertex_take_their_triangles_along(ag) -> None:
+    scene = ag.Scene()
+    corners = np.array([[0, 1, 2], [0, 2, 7]], np.int32)
+    mesh = scene.add_mesh(name="broken", positions=SQUARE, corners=corners, corner_vertices=np.arange(4, dtype=np.int32))
+    scene.add_instances(mesh, at(), name="o")
+    warnings = scene.commit()["warnings"]
+    assert len(warnings) == 1 and "mesh 'broken'" in warnings[0]
+    assert down(scene, 0.75, 0.25)["triangle"][0] == 0
+    with pytest.raises(ag.Error, match="corner_vertices"):
+        scene.add_mesh(name="bad", positions=SQUARE, corners=corners)
+
+
 @pytest.mark.parametrize(("arguments", "words"), [
     ({"positions": SQUARE[:, :2]}, ["mesh 'bad'", "positions", "(4, 2)"]),
     ({"positions": None}, ["mesh 'bad'", "positions"]),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import SRGB_TO_LINEAR, raw_view, read
-from .nodes import GENERATED, TANGENTS
+from .nodes import GENERATED, TANGENTS, UVS
 from .tangents import tangents
 
 DOMAINS = {"POINT": "vertex", "CORNER": "corner", "FACE": "face"}
@@ -31,18 +31,20 @@ def fingerprint(mesh: Any) -> tuple[int, ...]:
 
 
 def read_mesh(mesh: Any, attributes: Iterable[str] = ()) -> dict[str, Any] | None:
-    """Arguments of `Scene.add_mesh` without the name; None: no triangle. attributes: names that materials ask for."""
+    """Arguments of `Scene.add_mesh` without the name; None: no triangle. attributes: names that materials ask for, UVS
+    among them where anything asks for UV maps."""
     mesh.calc_loop_triangles()
     if not len(mesh.loop_triangles):
         return None
     result = _read_triangles(mesh)
     result["positions"] = read(mesh.vertices, "co", np.float32, 3)
     result.update(_read_normals(mesh))
-    result["uvs"], result["active_uv"] = _read_uvs(mesh)
+    result["uvs"], result["active_uv"] = _read_uvs(mesh) if UVS in attributes else ({}, "")
     result["attributes"], result["active_color"] = _read_attributes(mesh, set(attributes))
     for name in attributes:
         if name.startswith(TANGENTS):
-            found = tangents(result, name[len(TANGENTS):])
+            vertices = result["corner_vertices"][result["corners"]]
+            found = tangents({**result, "triangles": vertices}, name[len(TANGENTS):])
             if found is not None:
                 result["attributes"][name] = ("corner", found)
     if "vertex_normals" in result and result["smooth"].all():
@@ -62,8 +64,7 @@ def _read_triangles(mesh: Any) -> dict[str, NDArray[Any]]:
         faces = read(mesh.loop_triangle_polygons, "value", np.int32, 1)[:, 0]
     else:
         faces = read(triangles, "polygon_index", np.int32, 1, offset=12)[:, 0]
-    # The mode spares a check of every index: they are Blender's own.
-    result = {"triangles": np.take(vertices, corners, mode="clip"), "corners": corners, "faces": faces}
+    result = {"corners": corners, "corner_vertices": vertices, "faces": faces}
     materials = _read_material_indices(mesh)
     if materials is not None and materials.any():
         result["materials"] = materials

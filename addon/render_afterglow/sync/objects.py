@@ -19,7 +19,7 @@ from .attributes import Owner, random_of_name
 from .lights import is_portal, read_light
 from .materials import MaterialTable, digest
 from .meshes import fingerprint, read_mesh
-from .nodes import GENERATED, TANGENTS
+from .nodes import GENERATED, TANGENTS, UVS
 from .points import point_transforms, unit_sphere
 from .visibility import object_visibility
 
@@ -111,6 +111,7 @@ class ObjectTable:
         self.meshes: dict[GroupKey, MeshEntry] = {}
         self.groups: dict[GroupKey, Group] = {}
         self.lights: dict[GroupKey, LightEntry] = {}
+        self.shows_uvs = False  # the view layer has a pass of them: every mesh is read with its UV maps
 
     def used_materials(self) -> set[int]:
         return set(chain.from_iterable(group.materials for group in self.groups.values()))
@@ -299,10 +300,10 @@ class ObjectTable:
         return (not self.updates.everything and known.fingerprint == fingerprint_of(use) and known.names == names
                 and not geometry.intersection((*use.key[:2], use.original_data)))
 
-    @staticmethod
-    def _names(use: MeshUse) -> frozenset[str]:
+    def _names(self, use: MeshUse) -> frozenset[str]:
         attributes = getattr(use.data, "attributes", ())
-        return frozenset(name for name in use.wanted if name in ("", GENERATED) or name.startswith(TANGENTS)
+        wanted = use.wanted | {UVS} if self.shows_uvs else use.wanted
+        return frozenset(name for name in wanted if name in ("", GENERATED, UVS) or name.startswith(TANGENTS)
                          or name in attributes)
 
     def _read_mesh(self, use: MeshUse, address: int, names: frozenset[str], known: MeshEntry | None) -> MeshEntry:
@@ -422,7 +423,7 @@ def checksum(arrays: Iterable[NDArray[Any] | None], start: int = 0) -> int:
 
 def topology(arguments: dict[str, Any]) -> int:
     """A checksum of everything in a mesh but its positions and normals."""
-    names = ("triangles", "corners", "faces", "materials", "smooth")
+    names = ("triangles", "corners", "corner_vertices", "faces", "materials", "smooth")
     words = repr((list(arguments["uvs"]), arguments["active_uv"], list(arguments["attributes"]), arguments["active_color"],
                   len(arguments["positions"]), [name in arguments for name in ("corner_normals", "vertex_normals")]))
     return checksum([*(arguments.get(name) for name in names), *arguments["uvs"].values(),

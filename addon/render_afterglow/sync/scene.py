@@ -161,7 +161,9 @@ class SceneSync:
             self.warn(f"View layer '{layer.name}': Cryptomatte is not supported yet: its passes are left out")
         self.materials.begin(depsgraph, updates, report)
         report.seconds["materials"] = self._lap(start, report)
-        if updates.everything or updates.objects or self.materials.attributes_changed:
+        shows_uvs = view is None and bool(getattr(layer, "use_pass_uv", False))
+        if updates.everything or updates.objects or self.materials.attributes_changed or shows_uvs != self.objects.shows_uvs:
+            self.objects.shows_uvs = shows_uvs
             self.objects.update(depsgraph, layer, updates, report, lights=shading is None or shading[0])
         report.seconds["objects"] = self._lap(start, report)
         self._update_world(depsgraph, layer, report)

@@ -291,9 +291,13 @@ def constant_emission(graph: Graph) -> tuple[float, float, float] | None:
 GENERATED = "generated"  # the name under which a mesh carries coordinates of its undeformed shape
 TANGENTS = "tangents of "  # before a UV map's name ("": the active one): under which a mesh carries tangents for normal maps
 
+UVS = "uv maps"  # the name under which a mesh is asked for all of its UV maps
+# nodes that may look at UV maps, by name or by habit; every texture may, too
+READS_UVS = {"texture_coordinate", "uv_map", "normal_map", "tangent", "attribute", "color_attribute"}
+
 
 def names_of_attributes(graph: Graph) -> set[str]:
-    """Names of the mesh attributes that a graph asks for; "" is the active colour."""
+    """Names of the mesh attributes that a graph asks for; "" is the active colour, UVS all UV maps."""
     names = set()
     for node in graph["nodes"]:
         kind, params = node["type"], node["params"]
@@ -303,6 +307,8 @@ def names_of_attributes(graph: Graph) -> set[str]:
             names.add(TANGENTS + params.get("uv_map", ""))
         if any(is_link(value) and value[2] == GENERATED for value in node["inputs"].values()) or reads_generated(node):
             names.add(GENERATED)
+        if kind in READS_UVS or kind.endswith("_texture"):
+            names.add(UVS)
     return names
 
 
