@@ -68,10 +68,11 @@ py::dict commit(PyScene& self, py::object flatten) {
 }
 
 Handle add_mesh(PyScene& self, const py::kwargs& arguments) {
-  expect_keywords(arguments,
-                  {"name", "positions", "triangles", "corners", "corner_vertices", "corner_normals", "vertex_normals",
-                   "smooth", "faces", "materials", "uvs", "active_uv", "attributes", "active_color", "previous_positions"},
-                  "add_mesh");
+  expect_keywords(
+      arguments,
+      {"name", "positions", "triangles", "corners", "corner_vertices", "corner_normals", "vertex_normals", "smooth",
+       "faces", "materials", "uvs", "active_uv", "attributes", "active_color", "previous_positions"},
+      "add_mesh");
   if (!arguments.contains("name")) throw InvalidInput("add_mesh: name is missing");
   const EditLock lock(self);
   Mesh mesh = mesh_from_python(arguments, py::str(arguments["name"]).cast<std::string>());
@@ -90,10 +91,11 @@ void set_mesh(PyScene& self, Handle handle, const py::kwargs& arguments) {
     scene.deform_mesh(handle, std::move(d.positions), std::move(d.corner_normals), std::move(d.vertex_normals));
     return;
   }
-  expect_keywords(arguments,
-                  {"name", "positions", "triangles", "corners", "corner_vertices", "corner_normals", "vertex_normals",
-                   "smooth", "faces", "materials", "uvs", "active_uv", "attributes", "active_color", "previous_positions"},
-                  "set_mesh");
+  expect_keywords(
+      arguments,
+      {"name", "positions", "triangles", "corners", "corner_vertices", "corner_normals", "vertex_normals", "smooth",
+       "faces", "materials", "uvs", "active_uv", "attributes", "active_color", "previous_positions"},
+      "set_mesh");
   Mesh mesh = mesh_from_python(arguments, name);
   const py::gil_scoped_release free;
   scene.set_mesh(handle, std::move(mesh));

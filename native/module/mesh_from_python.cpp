@@ -116,7 +116,7 @@ Columns columns_from(const py::dict& arguments, const std::string& owner) {
 
 /// Triangles as they are given, or the vertices of their corners: beyond all vertices where there is no such corner.
 std::vector<uint32_t> take_triangles(const Columns& c) {
-  if (!c.corner_vertices.data) return take<uint32_t>(c.triangles);
+  if (c.triangles.data || !c.corner_vertices.data) return take<uint32_t>(c.triangles);
   std::vector<uint32_t> out = take<uint32_t>(c.corners);
   const char* vertices = c.corner_vertices.data;
   const size_t count = c.corner_vertices.rows;
@@ -164,22 +164,22 @@ Mesh mesh_of(const Columns& c, const std::string& name, const std::string& owner
   mesh.name = name;
   mesh.uvs.resize(c.uvs.size());
   // Each is a copy of its own: side by side where they are long.
-  std::vector<std::function<void()>> copies = {
-      [&] { mesh.positions = take<Vec3>(c.positions); },
-      [&] { mesh.previous_positions = take<Vec3>(c.previous); },
-      [&] { mesh.triangles = take_triangles(c); },
-      [&] {
-        if (reads_corners(c)) mesh.corners = take<uint32_t>(c.corners);
-      },
-      [&] { mesh.corner_normals = take<Vec3>(c.corner_normals); },
-      [&] { mesh.vertex_normals = take<Vec3>(c.vertex_normals); }};
+  std::vector<std::function<void()>> copies = {[&] { mesh.positions = take<Vec3>(c.positions); },
+                                               [&] { mesh.previous_positions = take<Vec3>(c.previous); },
+                                               [&] { mesh.triangles = take_triangles(c); },
+                                               [&] {
+                                                 if (reads_corners(c)) mesh.corners = take<uint32_t>(c.corners);
+                                               },
+                                               [&] { mesh.corner_normals = take<Vec3>(c.corner_normals); },
+                                               [&] { mesh.vertex_normals = take<Vec3>(c.vertex_normals); }};
   for (size_t i = 0; i < c.uvs.size(); ++i) {
     if (c.uvs[i].first == c.active_uv) mesh.active_uv = uint32_t(i);
     copies.push_back([&, i] { mesh.uvs[i] = {c.uvs[i].first, take<Vec2>(c.uvs[i].second)}; });
   }
-  parallel_blocks(copies.size(), 1, std::max(c.triangles.rows, c.corners.rows) < 20'000 ? 1 : 0, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) copies[i]();
-  });
+  parallel_blocks(copies.size(), 1, std::max(c.triangles.rows, c.corners.rows) < 20'000 ? 1 : 0,
+                  [&](size_t begin, size_t end) {
+                    for (size_t i = begin; i < end; ++i) copies[i]();
+                  });
   take_faces(mesh, c, owner);
   for (const AttributeColumn& a : c.attributes) {
     if (a.name == c.active_color) mesh.active_color = uint32_t(mesh.attributes.size());

@@ -229,19 +229,21 @@ void FilmVisitor<kPasses>::write_surface(const PathState& path, const SurfacePoi
   }
 }
 
-/// Albedo and normal for the denoiser: of the first surface that is not all but a mirror or clear glass.
+/// Albedo and normal for the denoiser: of the first surface of which less than three quarters are a mirror or clear
+/// glass, each lobe counted by the light that it sends on.
 template <bool kPasses>
 void FilmVisitor<kPasses>::write_features(const PathState& path, const SurfacePoint& point, const Surface& surface) {
   if (layout_[Pass::kAlbedo] < 0 && layout_[Pass::kDenoiseNormal] < 0) return;
+  constexpr float kSharp = 0.075f * 0.075f;
   float sharp = 0.0f, all = 0.0f;
   for (int i = 0; i < surface.count; ++i) {
     const Lobe& lobe = surface.lobes[i];
-    const float weight = lobe.weight.x + lobe.weight.y + lobe.weight.z;
-    all += weight;
-    if (lobe.kind >= LobeKind::kMicrofacetReflection && lobe.alpha_x * lobe.alpha_y < 0.15f * 0.15f) sharp += weight;
+    all += lobe.sampling_weight;
+    if (lobe.kind >= LobeKind::kMicrofacetReflection && lobe.alpha_x * lobe.alpha_y < kSharp)
+      sharp += lobe.sampling_weight;
   }
-  all += surface.transparency.x + surface.transparency.y + surface.transparency.z;
-  sharp += surface.transparency.x + surface.transparency.y + surface.transparency.z;
+  const float through = (surface.transparency.x + surface.transparency.y + surface.transparency.z) / 3.0f;
+  sharp = through + (1.0f - through) * sharp, all = through + (1.0f - through) * all;
   if (sharp > 0.75f * all && !path.last && path.context.depth < 4) return;
   features_known_ = true;
   const SurfaceAlbedo color = albedo(surface, point.outgoing);
