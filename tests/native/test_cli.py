@@ -70,3 +70,37 @@ def test_bench_writes_its_figures(library: Path, root: Path, tmp_path: Path) -> 
     wanted = {"figure", "scene", "value", "unit", "peer", "peer_value", "ratio", "goal", "holds", "command"}
     assert all(wanted <= set(f) for f in data["figures"])
     ElementTree.parse(tmp_path / "foundation_threads.svg")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["INSTANT_RADIOSITY", "INSTANT_CACHE", "HASH_CACHE"])
+def test_accuracy_of_a_caching_method(library: Path, tmp_path: Path, method: str) -> None:
+    """Five settings, each timed from an empty cache, and no error believed where the method has a bias."""
+    arguments = ("accuracy", "cornell_box", "--percent", "8", "--samples", "256", "--repeats", "1", "--method", method,
+                 "--output", str(tmp_path / "out"))
+    ended = run(library, *arguments, AFTERGLOW_CACHE=str(tmp_path / "cache"))
+    assert ended.returncode == 0, ended.stderr + ended.stdout
+    points = json.loads((tmp_path / "out" / "accuracy_cornell_box.json").read_text())["points"]
+    assert len(points) >= 5 and all(p["method"] == method and p["believed"] is None and p["noise"] > 0 for p in points)
+    assert [p["accuracy"] for p in points] == sorted((p["accuracy"] for p in points), reverse=True)
+
+
+def test_the_setting_in_use_is_marked() -> None:
+    from afterglow.accuracy import Point, Report, mark_in_use
+
+    def marked(**settings: object) -> list[str]:
+        report = Report("s", (8, 8), {})
+        for samples in (16, 64, 256):
+            believed = 1.6 / samples**0.5
+            report.points.append(Point("PATH_TRACING", f"{samples} spp", 1, 1, 0, 1, 1, 1, believed, believed, samples, 0.0))
+        for accuracy in (0.2, 0.05, 0.01):
+            report.points.append(Point("HASH_CACHE", f"accuracy {accuracy}", 1, 1, 0, 1, 1, 1, None, accuracy, 40, accuracy))
+        mark_in_use(report, dict(settings))
+        return [p.setting for p in report.points if p.in_use]
+
+    assert marked(method="AUTO", samples=200, accuracy=0.0) == ["256 spp"]
+    assert marked(method="PATH_TRACING", samples=1024, accuracy=0.2) == ["64 spp"], "it stops before its samples"
+    assert marked(method="PATH_TRACING", samples=20, accuracy=0.01) == ["16 spp"], "it ends before its accuracy"
+    assert marked(method="HASH_CACHE", samples=1024, accuracy=0.04) == ["accuracy 0.05"]
+    assert marked(method="HASH_CACHE", samples=1024, accuracy=0.0) == ["accuracy 0.01"]
+    assert marked(method="INSTANT_CACHE", samples=1024, accuracy=0.1) == [] and marked() == []
