@@ -10,8 +10,48 @@
 #if defined(__SSE2__)
 #include <xmmintrin.h>
 #endif
+#if defined(__SANITIZE_THREAD__)
+#include <sanitizer/tsan_interface.h>
+#endif
 
 namespace afterglow {
+
+namespace {
+
+/// Tells the thread sanitizer what TBB, which is not compiled with it, keeps from it: that work sees all that its giver
+/// did before, and its giver all that the work did. Without the sanitizer it is nothing.
+class Handover {
+ public:
+  Handover() { release(given_); }
+  ~Handover() { acquire(back_); }
+  Handover(const Handover&) = delete;
+
+  /// While alive: a piece of the work.
+  class Piece {
+   public:
+    explicit Piece(Handover& from) : from_(from) { acquire(from_.given_); }
+    ~Piece() { release(from_.back_); }
+    Piece(const Piece&) = delete;
+
+   private:
+    Handover& from_;
+  };
+
+ private:
+  static void acquire([[maybe_unused]] char& place) {
+#if defined(__SANITIZE_THREAD__)
+    __tsan_acquire(&place);
+#endif
+  }
+  static void release([[maybe_unused]] char& place) {
+#if defined(__SANITIZE_THREAD__)
+    __tsan_release(&place);
+#endif
+  }
+  char given_ = 0, back_ = 0;
+};
+
+}  // namespace
 
 #if defined(__SSE2__)
 FlushDenormals::FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040u); }  // flush and read as zero
@@ -29,7 +69,11 @@ unsigned thread_count(unsigned threads) {
 void run_limited(unsigned threads, const std::function<void()>& work) {
   if (threads == 0) return work();
   tbb::task_arena arena(static_cast<int>(threads));
-  arena.execute(work);
+  Handover handover;
+  arena.execute([&] {
+    const Handover::Piece piece(handover);
+    work();
+  });
 }
 
 void parallel_blocks(size_t count, size_t block, unsigned threads, const std::function<void(size_t, size_t)>& body,
@@ -46,9 +90,11 @@ void parallel_blocks(size_t count, size_t block, unsigned threads, const std::fu
     return;
   }
   run_limited(threads, [&] {
+    Handover handover;
     tbb::parallel_for(
         tbb::blocked_range<size_t>(0, blocks, 1),
         [&](const tbb::blocked_range<size_t>& range) {
+          const Handover::Piece piece(handover);
           for (size_t b = range.begin(); b != range.end(); ++b) run(b);
         },
         tbb::simple_partitioner());

@@ -3,8 +3,6 @@
 // images handed over without a copy unless they hold values that are not finite.
 #include "film/denoiser.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -12,6 +10,7 @@
 #include <mutex>
 
 #include "base/errors.h"
+#include "base/parallel.h"
 #include "film/oidn.h"
 
 namespace afterglow {
@@ -23,32 +22,35 @@ constexpr const char* kOidnLabel = "OpenImageDenoise";
 
 uint64_t count_broken(const float* image, uint32_t width, uint32_t height) {
   std::atomic<uint64_t> count{0};
-  tbb::parallel_for(uint32_t(0), height, [&](uint32_t y) {
-    const float* row = image + size_t(y) * width * 3;
+  parallel_blocks(size_t(width) * height * 3, 1 << 14, [&](size_t begin, size_t end) {
     uint64_t broken = 0;
-    for (size_t i = 0; i < size_t(width) * 3; ++i) broken += !std::isfinite(row[i]);
+    for (size_t i = begin; i < end; ++i) broken += !std::isfinite(image[i]);
     if (broken) count += broken;
   });
   return count;
 }
 
-/// A copy in which each value that is not finite is the mean of its finite neighbours (0 without any).
+/// The mean of a value's finite neighbours, 0 without any.
+float mean_around(const float* image, uint32_t width, uint32_t height, uint32_t x, uint32_t y, uint32_t channel) {
+  float sum = 0.0f;
+  int count = 0;
+  for (uint32_t ny = y ? y - 1 : 0; ny <= std::min(y + 1, height - 1); ++ny)
+    for (uint32_t nx = x ? x - 1 : 0; nx <= std::min(x + 1, width - 1); ++nx) {
+      const float v = image[(size_t(ny) * width + nx) * 3 + channel];
+      if (std::isfinite(v)) sum += v, ++count;
+    }
+  return count ? sum / float(count) : 0.0f;
+}
+
+/// A copy in which each value that is not finite is the mean of its finite neighbours.
 std::vector<float> mended(const float* image, uint32_t width, uint32_t height) {
   std::vector<float> out(image, image + size_t(width) * height * 3);
-  tbb::parallel_for(uint32_t(0), height, [&](uint32_t y) {
-    for (uint32_t x = 0; x < width; ++x)
-      for (uint32_t c = 0; c < 3; ++c) {
-        const size_t at = (size_t(y) * width + x) * 3 + c;
-        if (std::isfinite(image[at])) continue;
-        float sum = 0.0f;
-        int count = 0;
-        for (uint32_t ny = y ? y - 1 : 0; ny <= std::min(y + 1, height - 1); ++ny)
-          for (uint32_t nx = x ? x - 1 : 0; nx <= std::min(x + 1, width - 1); ++nx) {
-            const float v = image[(size_t(ny) * width + nx) * 3 + c];
-            if (std::isfinite(v)) sum += v, ++count;
-          }
-        out[at] = count ? sum / float(count) : 0.0f;
-      }
+  parallel_blocks(out.size(), 1 << 14, [&](size_t begin, size_t end) {
+    for (size_t at = begin; at < end; ++at) {
+      if (std::isfinite(image[at])) continue;
+      const size_t pixel = at / 3;
+      out[at] = mean_around(image, width, height, uint32_t(pixel % width), uint32_t(pixel / width), uint32_t(at % 3));
+    }
   });
   return out;
 }

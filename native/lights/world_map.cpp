@@ -3,10 +3,9 @@
 // resolution, too; a floor keeps directions possible that all probes missed.
 #include "lights/world_map.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 
+#include "base/parallel.h"
 #include "base/sampler.h"
 
 namespace afterglow {
@@ -23,8 +22,9 @@ Vec3 direction_at(float x, float y) {  // x: share of the turn, y: share of the 
 
 std::vector<float> probe(const WorldMap::Radiance& radiance, uint32_t width, uint32_t height) {
   std::vector<float> texels(size_t(width) * height);
-  tbb::parallel_for(uint32_t(0), height, [&](uint32_t y) {
-    for (uint32_t x = 0; x < width; ++x) {
+  parallel_blocks(texels.size(), 256, [&](size_t begin, size_t end) {
+    for (size_t texel = begin; texel < end; ++texel) {
+      const uint32_t x = uint32_t(texel % width), y = uint32_t(texel / width);
       float sum = 0.0f;
       for (uint32_t k = 0; k < kProbes; ++k) {
         const uint32_t h = hash(x, y, k);
@@ -33,7 +33,7 @@ std::vector<float> probe(const WorldMap::Radiance& radiance, uint32_t width, uin
         const float light = luminance(radiance(direction_at((x + dx) / width, (y + dy) / height)));
         sum += std::isfinite(light) ? std::max(light, 0.0f) : 0.0f;
       }
-      texels[size_t(y) * width + x] = sum / kProbes;
+      texels[texel] = sum / kProbes;
     }
   });
   return texels;
