@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every Blender that Afterglow promises to run in: `make test-blenders` calls it.
 
-Every test that official Blenders take part in runs in 4.2 LTS, 4.5 LTS and 5.0 (modules from PyPI), with the packaged extension.
-The native module, built by the suite's own compiler and libraries, its quick tests and all tests of the add-on, windows
-included, run in Debian's 4.3.2 (trixie) and 5.2.2 (sid), in roots made by debootstrap under build/roots; those programs check
-the extension's manifest, too. What the windows showed at the end of each test is kept under build/blenders. Last, one picture
-from all of them is compared. Mounts live in a namespace of their own, so nothing stays mounted. Needs root."""
+Every test that official Blenders take part in runs in 4.2 LTS, 4.5 LTS and 5.0 (modules from PyPI), with the packaged
+extension. The native module, built by the suite's own compiler and libraries, its quick tests and all tests of the add-on,
+windows included, run in Debian's 4.3.2 (trixie) and 5.2.2 (sid), in roots made by debootstrap under build/roots; those
+programs check the extension's manifest, too. What the windows showed at the end of each test is kept under build/blenders.
+Last, pictures of the same files by all of them, with the same samples and seed, are compared. Mounts live in a namespace of
+their own, so nothing stays mounted. Needs root."""
 
 from __future__ import annotations
 
@@ -30,6 +31,7 @@ PACKAGES = """blender python3-numpy g++ cmake ninja-build make git ccache pkg-co
     libembree-dev libglm-dev libopenimageio-dev libimath-dev libopenexr-dev libfmt-dev python3-pytest python3-pytest-xdist
     python3-openimageio xvfb xauth xdotool imagemagick libgl1-mesa-dri libegl1 python3-cattr python3-requests""".split()
 SUITES = ("trixie", "sid")
+COMPARED = ("cornell_box", "textured_room")  # files whose every node means the same in all releases
 # Blender's own changes of meaning between releases may move the mean of a picture by this much; noise is far below.
 MEAN_TOLERANCE = 0.01
 
@@ -126,20 +128,21 @@ def render(name: str, command: str | list[str | Path], suite: str = "") -> Path 
 
 
 def compare(scene: Path, suites: list[str], versions: list[str]) -> bool:
-    """Renders one scene everywhere with the same seed and samples, and prints how far each is from Debian's 3.4.1."""
+    """Renders a file everywhere with the same seed and samples, and prints how far each picture is from Debian's 3.4.1."""
+    print(f"{scene.stem}, 256 samples, the same seed:", flush=True)
     script = ROOT / "tools" / "one_picture.py"
     made = package.ensure()
     pictures: dict[str, Path | None] = {}
     wrapper = ROOT / "build" / "blender"
-    pictures["Debian 3.4.1"] = render("debian_3.4.1", [wrapper, "-b", scene, "--python", script, "--",
-                                                       PICTURES / "debian_3.4.1.exr"])
+    name = f"{scene.stem}_debian_3.4.1"
+    pictures["Debian 3.4.1"] = render(name, [wrapper, "-b", scene, "--python", script, "--", PICTURES / f"{name}.exr"])
     for version in versions:
-        name = f"official_{version}"
+        name = f"{scene.stem}_official_{version}"
         os.environ["AFTERGLOW_LIBRARY"] = str(made["library"])
         pictures[f"official {version}"] = render(name, [venvs.ensure(version), script, "--", PICTURES / f"{name}.exr", scene])
     os.environ.pop("AFTERGLOW_LIBRARY", None)
     for suite in suites:
-        name = f"debian_{suite}"
+        name = f"{scene.stem}_debian_{suite}"
         command = [wrapper, "-b", scene, "--python", script, "--", PICTURES / f"{name}.exr"]
         line = " ".join(shlex.quote(str(part)) for part in command)
         pictures[f"Debian {suite}"] = render(name, line, suite)
@@ -170,7 +173,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--suites", nargs="*", default=list(SUITES))
     parser.add_argument("--official", nargs="*", default=list(venvs.RELEASES))
-    parser.add_argument("--scene", type=Path, default=ROOT / "blend_files" / "cornell_box.blend")
+    parser.add_argument("--scene", type=Path, nargs="+", help="files whose pictures are compared",
+                        default=[ROOT / "blend_files" / f"{name}.blend" for name in COMPARED])
     parser.add_argument("--only", choices=("official", "debian", "compare"), help="one of the three parts")
     parser.add_argument("tests", nargs="*", help="what pytest runs in the roots")
     arguments = parser.parse_args()
@@ -187,8 +191,9 @@ def main() -> int:
         if arguments.only in (None, "debian"):
             failed += [] if test(suite, arguments.tests) else [f"Debian {suite}"]
             failed += [] if validate(suite) else [f"the manifest in Debian {suite}"]
-    if arguments.only in (None, "compare") and not compare(arguments.scene.resolve(), arguments.suites, arguments.official):
-        failed.append("the comparison of pictures")
+    for scene in arguments.scene if arguments.only in (None, "compare") else []:
+        if not compare(scene.resolve(), arguments.suites, arguments.official):
+            failed.append(f"the comparison of {scene.stem}")
     print(f"failed: {', '.join(failed)}" if failed else "all Blenders passed")
     return 1 if failed else 0
 
