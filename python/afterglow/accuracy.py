@@ -186,8 +186,8 @@ def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, 
         values = dict(setting.values)
         method = setting.method.split(" ")[0]
         effort = float(values.get("samples") or 1.0 / values["accuracy"])
-        took, before = spent.get(setting.method, (0.0, effort))
-        if took * max(1.0, effort / before) > budget:
+        whole_time, rendering, before = spent.get(setting.method, (0.0, 0.0, effort))
+        if whole_time + rendering * max(0.0, effort / before - 1.0) > budget:
             say(f"{setting.method} {setting.name}: left out, it would take more than {budget:g} s")
             continue
         errors, bars, seconds, shown, statistics = [], [], [], None, {}
@@ -198,7 +198,8 @@ def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, 
             bars.append(estimate.error)
             seconds.append(took)
             shown = image
-        spent[setting.method] = (min(seconds), effort)
+        # what is read and built before does not grow with the effort
+        spent[setting.method] = (min(seconds), (statistics.get("seconds") or {}).get("render", min(seconds)), effort)
         spread = float(np.std(errors, ddof=1) / math.sqrt(repeats)) if repeats > 1 else 0.0
         assert shown is not None
         points.append(Point(

@@ -126,6 +126,8 @@ def test_means_are_compared_beyond_three_standard_errors() -> None:
     worst, name, _ = compare(far, theirs)
     assert name == "DiffInd" and 3 < worst < 5
     assert compare({"combined": theirs["combined"]}, theirs)[0] == math.inf
+    black = {"combined": np.zeros(8)}
+    assert compare(black, black)[0] == 0 and compare({"combined": np.full(8, 1e-3)}, black)[0] > 1
 
 
 def test_the_cache_keeps_arrays_by_key(tmp_path, monkeypatch) -> None:

@@ -84,7 +84,7 @@ def compare(ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> tuple
         a, b = ours[name], reference
         difference = float(a.mean() - b.mean())
         error = float(np.hypot(a.std(ddof=1) / len(a) ** 0.5, b.std(ddof=1) / len(b) ** 0.5))
-        allowance = max(0.01 * abs(float(b.mean())), 0.001 * combined)
+        allowance = max(0.01 * abs(float(b.mean())), 0.001 * combined, 1e-9)  # a sealed room is black: what is allowed there is 0
         beyond, resolved = max(0.0, abs(difference) - 3 * error) / allowance, 3 * error / allowance
         details[name] = {"ours": float(a.mean()), "cycles": float(b.mean()), "standard_error": error, "of_allowance": beyond,
                          "resolved": resolved}
@@ -98,7 +98,7 @@ def describe(name: str, details: dict[str, Any]) -> str:
     worst = details[name]
     if not isinstance(worst, dict):
         return f"pass {name} is {worst}"
-    off = 100 * (worst["ours"] / worst["cycles"] - 1) if worst["cycles"] else float("inf")
+    off = 100 * (worst["ours"] / worst["cycles"] - 1) if worst["cycles"] else 0.0 if worst["ours"] == 0 else float("inf")
     noisy = [pass_ for pass_, d in details.items() if isinstance(d, dict) and d["resolved"] > 1]
     divided = [pass_.removesuffix(DIVIDED) for pass_ in noisy if pass_.endswith(DIVIDED)]
     noisy = [pass_ for pass_ in noisy if not pass_.endswith(DIVIDED)]
