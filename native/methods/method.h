@@ -39,6 +39,8 @@ struct MethodTraits {
   uint32_t terms = kIndirectDiffuse;
   bool layers = false;  // wants the layered filter
   bool needs_next_frame = false;
+  bool running = false;      // the picture of a view that stands still goes on from render to render
+  uint32_t lights = 1;       // samples of the light sources that the renderer takes at a first surface
   uint32_t interleave = 1;   // n: neighbouring pixels ask n × n different parts of the lights; answers want the
                              // discontinuity buffer
   bool fills_holes = false;  // prepare() wants only the points that gather() could not answer

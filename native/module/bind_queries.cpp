@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "base/sampler.h"
 #include "lights/camera.h"
+#include "methods/hash_cache/measure.h"
 #include "methods/hash_cache/occupied.h"
 #include "module/queries.h"
 #include "rays/measure_rays.h"
@@ -340,6 +341,19 @@ py::dict occupied_cells(const PyScene& self, int levels, const py::handle& point
   return out;
 }
 
+py::dict measure_lookups(uint64_t cells, uint64_t lookups) {
+  if (cells < 1 || cells > (uint64_t(1) << 28)) throw InvalidInput("measure_lookups: cells must be from 1 to 2^28");
+  hash_cache::LookupSpeeds speeds;
+  {
+    const py::gil_scoped_release free;
+    speeds = hash_cache::measure_lookups(cells, lookups);
+  }
+  py::dict out;
+  out["table"] = speeds.table, out["map"] = speeds.map, out["reads"] = speeds.reads;
+  out["table_bytes"] = speeds.table_bytes, out["map_bytes"] = speeds.map_bytes;
+  return out;
+}
+
 }  // namespace
 
 void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>& scene) {
@@ -360,6 +374,7 @@ void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>&
         py::arg("kind") = "closest", py::arg("rounds") = 8);
   m.def("occupied_cells", &occupied_cells, py::arg("scene"), py::arg("levels"), py::arg("points") = py::list(),
         py::arg("threads") = 0);
+  m.def("measure_lookups", &measure_lookups, py::arg("cells"), py::arg("lookups"));
   m.def("versions", &versions);
   m.def("set_log", &set_log, py::arg("sink"));
   m.def("sobol", &sobol_points, py::arg("count"), py::arg("dimensions"), py::arg("seed"));

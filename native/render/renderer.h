@@ -26,6 +26,7 @@ class Renderer {
   const std::string& method() const { return id_; }
   /// Whether what samples spread by is the picture's error, or noise alone.
   bool exact() const { return method_->traits().exact; }
+  bool running() const { return method_->traits().running; }
   void configure(const Settings&);
 
   /// Brings the method up to date with the scene. Not while render() runs.

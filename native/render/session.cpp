@@ -9,6 +9,7 @@
 
 #include "base/errors.h"
 #include "base/parallel.h"
+#include "render/running_estimate.h"
 
 namespace afterglow {
 
@@ -247,6 +248,7 @@ void Session::run(RenderSettings settings) {
     Renderer& renderer = *kept;
     Settings method_settings = settings.method_settings;
     method_settings.emplace_back("accuracy", double(settings.accuracy));
+    method_settings.emplace_back("denoise", settings.denoise);
     renderer.configure(method_settings);
     if (settings.denoise) settings.film.passes |= kDenoisePasses;
     std::shared_ptr<Film> film;
@@ -255,7 +257,11 @@ void Session::run(RenderSettings settings) {
       if (film_ && film_.use_count() == 1) film.swap(film_);  // nobody reads it: its memory serves again
     }
     const FilmSettings wanted = completed(settings.film);
-    if (film && film->settings() == wanted)
+    const bool running = renderer.running() && !settings.viewport;
+    uint32_t before = 0;
+    if (auto last = running ? RunningEstimate::take(*scene_, settings, wanted, before) : nullptr)
+      film = std::move(last);
+    else if (film && film->settings() == wanted)
       film->clear();
     else
       film = std::make_shared<Film>(wanted);
@@ -270,8 +276,10 @@ void Session::run(RenderSettings settings) {
       statistics_.threads = thread_count(settings.threads);
       statistics_.bytes["film"] = film->bytes();
     }
-    run_limited(settings.threads, [&] { render_passes(settings, renderer, *film); });
+    uint32_t samples = 0;
+    run_limited(settings.threads, [&] { samples = render_passes(settings, renderer, *film, before); });
     if (stop_) result = SessionState::kCancelled;
+    if (running && !stop_) RunningEstimate::leave(*scene_, settings, film, samples);
     Renderer::leave(*scene_, std::move(kept));
   } catch (const std::bad_alloc&) {
     failure = std::make_exception_ptr(OutOfMemory("the render ran out of memory; lower the resolution or the passes"));

@@ -89,7 +89,8 @@ class Session {
   void stop_thread();
   void launch();
   void run(RenderSettings);
-  void render_passes(const RenderSettings&, Renderer&, Film&);
+  /// From `before` samples on, which the film has already; returns how many it has then.
+  uint32_t render_passes(const RenderSettings&, Renderer&, Film&, uint32_t before);
   void publish(const RenderSettings&, const Film&, uint32_t step, bool filtered);
   bool filter(const RenderSettings&, const Film&, Image&);
   void warn(const std::string&);

@@ -58,7 +58,7 @@ void Session::forget_cache() const {
   Renderer::take(*scene_, Renderer::chosen(settings_.method, settings_.viewport)).reset();
 }
 
-void Session::render_passes(const RenderSettings& settings, Renderer& renderer, Film& film) {
+uint32_t Session::render_passes(const RenderSettings& settings, Renderer& renderer, Film& film, uint32_t before) {
   Work work{.stop = StopToken(&stop_),
             .seed = uint64_t(settings.seed),
             .threads = settings.threads,
@@ -78,14 +78,14 @@ void Session::render_passes(const RenderSettings& settings, Renderer& renderer, 
   }
   const FilmSettings& f = film.settings();
   const uint64_t pixels = uint64_t(film.width()) * film.height();
-  const ScheduleOptions options{settings.samples, settings.viewport, settings.time_limit > 0.0f,
+  const ScheduleOptions options{before + settings.samples, settings.viewport, settings.time_limit > 0.0f,
                                 coarsest_step(pixels, sample_seconds_)};
   bool shown_filtered = false;
-  uint32_t done = 0;
+  uint32_t done = before;
   double in_passes = 0.0, at_last_publish = 0.0;
   for (uint32_t index = 0; !stop_; ++index) {
     const PassPlan plan = plan_pass(options, index, done);
-    if (!plan.count || limit_reached(in_passes, settings.time_limit, done, plan.count)) break;
+    if (!plan.count || limit_reached(in_passes, settings.time_limit, done - before, plan.count)) break;
     work.pass = index;
     begun = now();
     const std::vector<PixelRequest> requests = pass_requests(plan, f.x0, f.y0, f.x1, f.y1);
@@ -125,6 +125,7 @@ void Session::render_passes(const RenderSettings& settings, Renderer& renderer, 
   }
   if (!stop_ && settings.denoise && done && !settings.viewport) publish(settings, film, 1, true);
   if (!stop_ && settings.viewport && !shown_filtered && done) publish(settings, film, 1, false);
+  return done;
 }
 
 /// Puts a picture where readers find it: the film's as it is, or filtered.

@@ -39,7 +39,7 @@ struct Wavefront {
 };
 
 void walk(const path_tracing::KernelInput& input, WalkKernel kernel, std::span<const PixelRequest> requests,
-          Wavefront& wave, Work& work, WavefrontTimes& times) {
+          uint32_t lights, Wavefront& wave, Work& work, WavefrontTimes& times) {
   const Stopwatch watch(times.walk);
   wave.requests.resize(requests.size());
   parallel_blocks(
@@ -48,6 +48,7 @@ void walk(const path_tracing::KernelInput& input, WalkKernel kernel, std::span<c
         for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
           while (work.pause && work.pause->load() && !work.stop.stop())
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
+          wave.requests[i].lights = lights;
           kernel(input, requests[i], wave.requests[i]);
         }
       },
@@ -235,9 +236,10 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
                                         .seed = hash(uint32_t(work.seed), uint32_t(work.seed >> 32)),
                                         .stop = work.stop};
   const WalkKernel kernel = choose_walk_kernel(scene.effects, film.settings().passes, work.shown);
-  const uint32_t interleave = method.traits().interleave;
+  const MethodTraits traits = method.traits();
+  const uint32_t interleave = traits.interleave;
   std::vector<PixelRequest> requests(all.begin(), all.end());
-  const bool layers = method.traits().layers;
+  const bool layers = traits.layers;
   const bool apart = interleave > 1 || layers;
   if (apart) {  // neighbours share what they found for the same sample
     requests.clear();
@@ -256,7 +258,7 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
     const std::span<const PixelRequest> part(requests.data() + begin, end - begin);
     begin = end;
     Wavefront wave;
-    walk(input, kernel, part, wave, work, times);
+    walk(input, kernel, part, traits.lights, wave, work, times);
     if (work.stop.stop()) return;
     answer(method, scene, wave, work, times);
     if (work.stop.stop()) return;

@@ -25,6 +25,7 @@ struct WalkedRequest {
   std::vector<CachePoint> points;
   std::vector<Question> questions;  // one a point
   RayCounts counts;
+  uint32_t lights = 1;  // samples of the light sources at a first surface
   bool done = false;
 };
 

@@ -23,6 +23,11 @@ class AskingVisitor : public path_tracing::FilmVisitor<kPasses> {
     layer_ = 0;
   }
 
+  /// More where more of the light reaches the picture.
+  uint32_t lights(const PathState& path) const {
+    return glm::max(1u, uint32_t(std::lround(float(out_.lights) * glm::min(1.0f, max_component(path.throughput)))));
+  }
+
   void diffuse(const PathState& path, const SurfacePoint& point, const Surface& surface) {
     if (this->placing_) return;
     Rgb front(0.0f), back(0.0f);

@@ -12,8 +12,11 @@
 //   camera
 // A visitor that names a type SplitsDiffuse is also told
 //   void diffuse(const PathState&, const SurfacePoint&, const Surface& diffuse_lobes)
+//   uint32_t lights(const PathState&)         how many times light sources are asked here
 // and answers for the light that other surfaces send there: the walk goes on through the other lobes alone, and the
 // light sources that it looks for are not weighed against diffuse directions that are never taken.
+// A visitor that names a type MayAnswer is asked at each vertex, after surface(), whether it has done so:
+//   bool answered() const
 // A visitor that names a type Carries keeps throughputs of its own, from several vertices of the path at once. It is
 // also told
 //   void turned(const BsdfSample&)        a direction was asked for, valid or not, after the choice not to go straight
@@ -69,6 +72,11 @@ inline constexpr bool kCarries = requires {
   typename Visitor::Carries;
 };
 
+template <class Visitor>
+inline constexpr bool kMayAnswer = requires {
+  typename Visitor::MayAnswer;
+};
+
 template <uint32_t kFeatures>
 class Walker {
   static constexpr bool kLobes = kFeatures & kFeatureLobes;
@@ -115,7 +123,12 @@ class Walker {
         straight = kStraight ? straight_probability(surface) : 0.0f;
         if (diffuse.count) visitor.diffuse(path, point, diffuse);
         if (diffuse.count || surface.count)
-          look_for_light(path, point, surface, &diffuse, 1.0f - straight, u_light, u_emitter, visitor);
+          ask_lights(path, point, surface, diffuse, 1.0f - straight, u_light, u_emitter, visitor);
+      } else if (answered(visitor)) {
+        Surface diffuse;
+        split_diffuse(surface, diffuse);
+        straight = kStraight ? straight_probability(surface) : 0.0f;
+        look_for_light(path, point, surface, &diffuse, 1.0f - straight, u_light, u_emitter, visitor);
       } else {
         straight = kStraight ? straight_probability(surface) : 0.0f;
         if (surface.count && straight < 1.0f)
@@ -242,15 +255,38 @@ class Walker {
   }
 
   template <class Visitor>
+  static bool answered(const Visitor& visitor) {
+    if constexpr (kMayAnswer<Visitor>)
+      return visitor.answered();
+    else
+      return false;
+  }
+
+  /// Several samples of the lights: their choice in even steps, the place on them by a lattice (Roberts 2018).
+  template <class Visitor>
+  void ask_lights(const PathState& path, const SurfacePoint& point, const Surface& surface, const Surface& diffuse,
+                  float scatter_share, float u_light, const Vec2& u, Visitor& visitor) const {
+    const uint32_t count = visitor.lights(path);
+    const float share = 1.0f / float(count);
+    const auto fraction = [](float x) { return std::fmin(x - std::floor(x), 0x1.fffffep-1f); };
+    for (uint32_t k = 0; k < count; ++k) {
+      const Vec2 place = k ? Vec2(fraction(u.x + 0.7548777f * float(k)), fraction(u.y + 0.5698403f * float(k))) : u;
+      look_for_light(path, point, surface, &diffuse, scatter_share, k ? fraction(u_light + share * float(k)) : u_light,
+                     place, visitor, share);
+    }
+  }
+
+  template <class Visitor>
   void look_for_light(const PathState& path, const SurfacePoint& point, const Surface& surface,
                       [[maybe_unused]] const Surface* diffuse, float scatter_share, float u_light, const Vec2& u,
-                      Visitor& visitor) const {
+                      Visitor& visitor, [[maybe_unused]] float share = 1.0f) const {
     LightSample light;
     if (!scene_.lights.sample(point.position, light_normal(point, surface), u_light, u, light)) return;
     if (!(light.density > 0.0f) || is_black(light.radiance)) return;
     BsdfValue value = evaluate<!kLobes>(surface, point.face_normal, point.outgoing, light.direction);
     float weight = 1.0f;
-    if constexpr (kSplits<Visitor>) {  // nothing but this sample looks for the diffuse lobes' light
+    const bool split = kSplits<Visitor> || (kMayAnswer<Visitor> && diffuse);
+    if (split) {  // nothing but this sample looks for the diffuse lobes' light
       if (!light.delta) weight = power_heuristic(light.density, value.density * scatter_share);
       const BsdfValue whole = evaluate<!kLobes>(*diffuse, point.face_normal, point.outgoing, light.direction);
       value.diffuse = value.diffuse * weight + whole.diffuse;
@@ -266,8 +302,8 @@ class Walker {
       }
     }
     if (is_black(value.total())) return;
-    if constexpr (!kSplits<Visitor>)
-      weight = light.delta ? 1.0f : power_heuristic(light.density, value.density * scatter_share);
+    if (!split) weight = light.delta ? 1.0f : power_heuristic(light.density, value.density * scatter_share);
+    if constexpr (kSplits<Visitor>) weight *= share;
     Rgb arriving = light.radiance * (weight / light.density);
     if (light.cast_shadow) {
       const Ray ray = shadow_ray(point, light);

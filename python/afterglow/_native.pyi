@@ -293,4 +293,8 @@ def measure_rays(scene: Scene, origins: NDArray[np.float64], directions: NDArray
 def occupied_cells(scene: Scene, levels: int, points: NDArray[np.float64] = ..., threads: int = 0) -> dict[str, Any]:
     """Cells that hold geometry, on grids of 1 to 2^levels (at most 12) cells each way: cells, blocks and map_bytes a level,
     seconds_mark, seconds_maps, peak_bytes; index (levels + 1, N): each point's cell's data on each level, -1 where empty."""
+def measure_lookups(cells: int, lookups: int) -> dict[str, float]:
+    """Look-ups a second on one thread among so many cells of the HashCache, each of which reads the cell's light: in the table
+    of cells that are made when needed, in the paper's map over occupied cells (data included), and bare random reads of an array
+    of cells. table, map, reads; table_bytes, map_bytes."""
 def sobol(count: int, dimensions: int, seed: int) -> NDArray[np.float32]: ...

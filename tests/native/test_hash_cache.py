@@ -33,7 +33,7 @@ class Live:
         self.built = Built(description)
         self.settings = {**HASH, "width": 32, "height": 32, "samples": 2, "diffuse_bounces": 4,
                          "passes": ["combined", "diffuse_indirect"],
-                         **settings}
+                         "hash_running": False, **settings}
         self.built.set_camera((self.settings["width"], self.settings["height"]), 0)
         self.built.scene.commit()
         self.session = afterglow.Session(self.built.scene, self.settings)
@@ -101,6 +101,55 @@ def test_path_length_is_a_bounce_limit_and_stored_surfaces_change_no_mean() -> N
     truth = indirect(scene, 4, method="PATH_TRACING", samples=128, diffuse_bounces=4)
     for store in (1, 8):
         agree(indirect(scene, 6, samples=32, diffuse_bounces=4, hash_store=store, **HASH), truth, tolerance=0.01)
+
+
+def test_paths_that_end_in_cells_change_no_mean() -> None:
+    """Even where a single bounce more would show."""
+    scene = cornell_box()
+    for bounces in (2, 4):
+        whole = indirect(scene, 6, samples=32, diffuse_bounces=bounces, hash_long_paths=1.0, **HASH)
+        agree(indirect(scene, 6, samples=32, diffuse_bounces=bounces, **HASH), whole, tolerance=0.005)
+    values = [render(scene, size=64, samples=16, hash_long_paths=share, **HASH).statistics["rays"]["cache"]
+              for share in (1.0, 0.1)]
+    assert values[1] < 0.8 * values[0]  # in a box, many rays are shorter than the cells of so small a picture
+
+
+def test_more_light_samples_change_no_mean_and_less_noise() -> None:
+    scene = cornell_box()
+
+    def direct(**settings: Any) -> np.ndarray:
+        return render(scene, size=32, passes=["diffuse_direct"], **settings).passes["diffuse_direct"]
+
+    truth = direct(samples=1024, method="PATH_TRACING", seed=8)
+    errors = {}
+    for lights in (1, 8):
+        images = [direct(samples=4, hash_lights=lights, seed=s, **HASH) for s in range(6)]
+        means = [float(image.mean()) for image in images]
+        agree(Mean(float(np.mean(means)), float(np.std(means, ddof=1) / 6**0.5)), Mean(float(truth.mean()), 0.002 * float(truth.mean())),
+              tolerance=0.005)
+        errors[lights] = float(np.median([np.median((image - truth) ** 2) for image in images]))
+    assert errors[8] < 0.7 * errors[1]
+
+
+def test_the_picture_of_a_still_view_goes_on() -> None:
+    still = Live(cornell_box(), hash_running=True)
+
+    def samples(seed: int) -> int:
+        still.session.update({"seed": seed})
+        still.session.wait()
+        return int(still.session.statistics()["samples"])
+
+    assert samples(1) == 4  # the first run had seed 0
+    two = still.session.read("combined")
+    assert samples(2) == 6
+    assert not np.array_equal(two, still.session.read("combined"))
+    assert samples(2) == 2  # the same again is a picture of its own
+    assert samples(3) == 4
+    still.look_from((0.1, -3.5, 1.0), (0, 0, 1.0))
+    assert int(still.session.statistics()["samples"]) == 2
+    assert samples(4) == 4
+    still.edit(lambda: still.built.scene.set_light(still.built.lights["Lamp"], power=0.0))
+    assert int(still.session.statistics()["samples"]) == 2 and still.session.read("diffuse_indirect").max() == 0.0
 
 
 def test_pixels_converge_and_much_sooner_than_paths() -> None:

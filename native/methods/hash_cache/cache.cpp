@@ -11,9 +11,13 @@ namespace afterglow::hash_cache {
 
 namespace {
 
-constexpr float kEnough = 0.01f;  // share of the light that the levels above need not bring
+constexpr float kFarthest = 0.04f;  // of the ray's length: how far look-ups may be scattered beyond the asked jitter
+constexpr float kEnough = 0.01f;    // share of the light that the levels above need not bring
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+/// Cells of few samples are blotches; look-ups that scatter farther make fine grain of them, which filters take away.
+float widened(uint32_t count) { return std::clamp(std::sqrt(1024.0f / float(count + 1)), 1.0f, 6.0f); }
 
 /// From blue over green to red.
 Rgb scale_color(float t) {
@@ -55,7 +59,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
 bool Cache::trace(const WalkScene& walk, std::span<const CachePoint> points, Work& work) {
   const double begun = now();
   RayCounts rays;
-  std::vector<Sample> samples = cache_paths(walk, grid_, settings_.caching, points, seed_, work, rays);
+  std::vector<Sample> samples = cache_paths(walk, grid_, table_, settings_.caching, points, seed_, work, rays);
   const double traced = now();
   counts_.seconds_paths += traced - begun;
   if (work.stop.stop()) return false;
@@ -78,14 +82,26 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   const uint32_t more = settings_.caching.store;  // every stored vertex counts its own scatterings
   walk.limits.max_bounces += more, walk.limits.diffuse += more, walk.limits.glossy += more;
   walk.limits.transmission += more, walk.limits.transparent += more;
-  if (settings_.resolution >= 1.0f) {
-    trace(walk, points, work);
-    return;
+  std::vector<float> shares(points.size());
+  parallel_blocks(points.size(), 256, work.threads, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const CachePoint& p = points[i];
+      const int level = int(grid_.level(p.footprint * settings_.caching.cell_pixels));
+      const Record* r = table_.find(grid_.cell(p.position, owner_of(p.instance, p.face_normal), level));
+      shares[i] = settings_.resolution * share_of_paths(r ? r->count() : 0, settings_.enough);
+    }
+  });
+  std::array<std::vector<CachePoint>, 3> slices;  // the first few fill cells in which the others end
+  std::vector<CachePoint> rest;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const float u = unit_float(hash(hash_of(points[i], seed_), points[i].sample, 1));
+    if (u < shares[i])
+      slices[u < 0.03f * shares[i] ? 0 : u < 0.2f * shares[i] ? 1 : 2].push_back(points[i]);
+    else
+      rest.push_back(points[i]);
   }
-  std::vector<CachePoint> chosen, rest;
-  for (const CachePoint& p : points)
-    (unit_float(hash(hash_of(p, seed_), p.sample, 1)) < settings_.resolution ? chosen : rest).push_back(p);
-  if (!trace(walk, chosen, work)) return;
+  for (const auto& slice : slices)
+    if (!slice.empty() && !trace(walk, slice, work)) return;
   std::vector<uint8_t> open(rest.size());
   parallel_blocks(rest.size(), 256, work.threads, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) open[i] = !(answer(rest[i]).weight > 0.0f);
@@ -109,8 +125,12 @@ Answer Cache::answer(const CachePoint& p) const {
   const int finest = int(wanted);
   const uint32_t random = hash(hash_of(p, seed_), p.sample, 2);
   const Frame frame(p.face_normal);
-  const Vec3 offset = settings_.jitter * ((2.0f * unit_float(random) - 1.0f) * frame.t +
-                                          (2.0f * unit_float(hash(random)) - 1.0f) * frame.b);
+  const Record* here = settings_.jitter > 0.0f ? table_.find(grid_.cell(p.position, owner, finest)) : nullptr;
+  const float wide = std::max(1.0f, std::min(widened(here ? here->count() : 0),
+                                             kFarthest * p.segment / (settings_.jitter * grid_.size(finest))));
+  const Vec3 offset =
+      settings_.jitter * wide *
+      ((2.0f * unit_float(random) - 1.0f) * frame.t + (2.0f * unit_float(hash(random)) - 1.0f) * frame.b);
   Rgb light(0.0f);
   float missing = 1.0f, samples = 0.0f;
   for (int level = finest; level <= kTopLevel && missing > kEnough; ++level) {
@@ -124,6 +144,14 @@ Answer Cache::answer(const CachePoint& p) const {
     samples += taken * float(record->count());
     missing -= taken;
   }
+  // Where the camera's paths have left nothing at all: what others found there, without the last of their bounces.
+  for (int level = finest; level <= kTopLevel && !(missing < 1.0f); ++level)
+    if (const Record* record = look_up(p, offset, owner | kOnTheWay, level)) {
+      const float taken = trust(record->count(), settings_.trusted);
+      light += taken * shown(*record, p, level);
+      samples += taken * float(record->count());
+      missing -= taken;
+    }
   if (!(missing < 1.0f)) return {};
   const float found = 1.0f - missing;
   return {kPi / found * light, 1.0f, 1.0f / std::sqrt(1.0f + samples / found)};

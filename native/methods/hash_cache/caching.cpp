@@ -15,10 +15,8 @@ namespace {
 constexpr uint32_t kMostStored = 16;
 constexpr float kMostLight = 1e30f;  // what is above is dropped and counted, as in the path tracer
 constexpr size_t kBlock = 128;
-/// Surfaces that a path meets later are met by other laws than the camera's: mixed into its cells they would pull the
-/// mean towards the part of a cell that faces other surfaces. They fill larger cells, which answer where nothing else
-/// does yet.
-constexpr int kFartherLevels = 2;
+constexpr uint32_t kSettled = 32;  // samples from which on a path may end in a cell
+constexpr float kLongest = 0.5f;   // of the way to a surface: the longest cell that a path may end in there
 
 /// A vertex of the path that keeps a sample, and how much of the light that is found now would arrive there.
 struct Stored {
@@ -27,19 +25,38 @@ struct Stored {
   Rgb throughput{0.0f};  // cos / (pi × density) of the direction taken, times all factors since
   Rgb light{0.0f};       // irradiance / pi
   PathContext counts;    // scatterings as if the path began here: the limits are the path tracer's
+  uint32_t before = 0;   // scatterings counted for it before its own
   bool sampled = false;  // a direction was asked for
   bool live = false;     // light still counts
   bool last = false;     // only light that is run into
 };
 
+struct PathInput {
+  const WalkScene& walk;
+  const Grid& grid;
+  const Table& table;
+  const CachingSettings& settings;
+  WalkLimits limits;  // of each stored vertex
+  uint32_t seed;
+};
+
 class StoringVisitor {
  public:
   using Carries = void;
-  StoringVisitor(const WalkLimits& limits, uint32_t store) : limits_(limits), store_(std::min(store, kMostStored)) {}
+  using MayAnswer = void;
+  explicit StoringVisitor(const PathInput& in)
+      : in_(in), limits_(in.limits), store_(std::min(in.settings.store, kMostStored)) {
+    count_bounce(later_, limits_, LobeClass::kDiffuse, false, false);
+  }
 
   /// The point that asks, and the direction taken from there in proportion to the cosine.
   void begin(const CachePoint& p, PathContext& context) {
     count_ = 0, pending_ = 0;
+    const uint32_t random = hash(hash_of(p, in_.seed), p.sample, 3);
+    may_end_ = !(unit_float(random) < in_.settings.long_paths);
+    answered_ = false;
+    level_ = std::min(int(in_.grid.level(p.footprint * in_.settings.cell_pixels)) + kFartherLevels, kTopLevel);
+    jitter_ = {unit_float(hash(random)) - 0.5f, unit_float(hash(random, 1u)) - 0.5f};
     vertices_ = 1;
     Stored& first = stored_[count_++] = Stored{};
     first.position = p.position, first.face_normal = p.face_normal, first.normal = p.normal;
@@ -53,13 +70,19 @@ class StoringVisitor {
   std::span<const Stored> stored() const { return {stored_, count_}; }
 
   void traced(const Ray&, bool) {}
-  bool surface(const PathState&, const SurfacePoint& point, const Surface& surface) {
+  bool answered() const { return answered_; }
+  bool surface(const PathState& path, const SurfacePoint& point, const Surface& surface) {
     pending_ = count_;
+    answered_ = false;
     bool front = false, back = false;
     for (int i = 0; i < surface.count; ++i) {
       front |=
           surface.lobes[i].kind < LobeKind::kMicrofacetReflection && surface.lobes[i].kind != LobeKind::kTranslucent;
       back |= surface.lobes[i].kind == LobeKind::kTranslucent;
+    }
+    if ((front || back) && vertices_ == 1 && may_end_) {
+      answered_ = end(path, point, surface, front, back);
+      if (answered_) vertices_ = store_;  // what other lobes find later is of no use to cells
     }
     if ((front || back) && vertices_ < store_) {
       vertices_++;
@@ -79,7 +102,7 @@ class StoringVisitor {
   /// A vertex's own direct light is looked for where the picture is made.
   void emitted(const PathState&, const Rgb& light) {
     for (uint32_t i = 0; i < count_; ++i)
-      if (Stored& s = stored_[i]; s.live && s.counts.depth > 1) s.light += s.throughput * light;
+      if (Stored& s = stored_[i]; s.live && s.counts.depth > 1 + s.before) s.light += s.throughput * light;
   }
   void escaped(const PathState& path, const Rgb& light) {
     if (!is_black(light)) emitted(path, light);
@@ -120,26 +143,53 @@ class StoringVisitor {
   }
 
  private:
+  /// The light that other surfaces send to this one, from a cell on the way that is much shorter than the way and holds
+  /// samples enough, for all of the surface's sides or for none.
+  bool end(const PathState& path, const SurfacePoint& point, const Surface& surface, bool front, bool back) {
+    if (stored_[0].last) return false;
+    const float longest = kLongest * path.context.ray_length;
+    const Record* records[2] = {};
+    if (front && !(records[0] = settled(point, 1.0f, longest))) return false;
+    if (back && !(records[1] = settled(point, -1.0f, longest))) return false;
+    Rgb light(0.0f);
+    for (int i = 0; i < surface.count; ++i)
+      if (surface.lobes[i].kind < LobeKind::kMicrofacetReflection)
+        light += surface.lobes[i].weight * records[surface.lobes[i].kind == LobeKind::kTranslucent]->light;
+    for (uint32_t i = 0; i < count_; ++i)
+      if (Stored& s = stored_[i]; s.live && !s.last) s.light += s.throughput * light;
+    return true;
+  }
+  const Record* settled(const SurfacePoint& point, float side, float longest) const {
+    const uint32_t owner = owner_of(point.instance, point.face_normal * side) | kOnTheWay;
+    const Frame frame(point.face_normal);
+    const Vec3 offset = jitter_.x * frame.t + jitter_.y * frame.b;
+    for (int level = level_; level <= kTopLevel && in_.grid.size(level) <= longest; ++level) {
+      const Record* r = in_.table.find(in_.grid.cell(point.position + offset * in_.grid.size(level), owner, level));
+      if (!r || r->count() < kSettled) r = in_.table.find(in_.grid.cell(point.position, owner, level));
+      if (r && r->count() >= kSettled) return r;
+    }
+    return nullptr;
+  }
+
   void store(const SurfacePoint& point, float side) {
     if (count_ == kMostStored) return;
     Stored& s = stored_[count_++] = Stored{};
+    s.counts = later_;
+    s.before = later_.depth;
     s.position = point.position, s.instance = point.instance;
     s.face_normal = point.face_normal * side, s.normal = point.normal * side;
   }
 
+  const PathInput& in_;
   const WalkLimits& limits_;
   const uint32_t store_;
+  PathContext later_;  // of a surface that is not the path's first
+  bool may_end_ = false, answered_ = false;
+  int level_ = 0;  // of the cells on the way
+  Vec2 jitter_{0.0f};
   Stored stored_[kMostStored];
   uint32_t count_ = 0, pending_ = 0;  // of stored vertices; of those before the surface where the path stands
   uint32_t vertices_ = 0;             // surfaces that keep samples, whatever the sides
-};
-
-struct PathInput {
-  const WalkScene& walk;
-  const Grid& grid;
-  const CachingSettings& settings;
-  WalkLimits limits;  // of each stored vertex
-  uint32_t seed;
 };
 
 SurfacePoint start_of(const CachePoint& p) {
@@ -151,7 +201,7 @@ SurfacePoint start_of(const CachePoint& p) {
 template <uint32_t kFeatures>
 void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<Sample>& out, RayCounts& counts) {
   const Walker<kFeatures> walker(in.walk, counts);
-  StoringVisitor visitor(in.limits, in.settings.store);
+  StoringVisitor visitor(in);
   for (const CachePoint& p : points) {
     Sampler sampler(hash_of(p, in.seed), p.sample);
     const Vec2 u = sampler.next2();
@@ -172,7 +222,9 @@ void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<
     const int level = int(in.grid.level(p.footprint * in.settings.cell_pixels));
     for (const Stored& s : visitor.stored()) {
       if (!s.sampled) continue;
-      const int at = &s == visitor.stored().data() ? level : std::min(level + kFartherLevels, kTopLevel);
+      const bool first = &s == visitor.stored().data();
+      const int at = first ? level : std::min(level + kFartherLevels, kTopLevel);
+      const uint32_t owner = owner_of(s.instance, s.face_normal) | (first ? 0u : kOnTheWay);
       const float sum = s.light.x + s.light.y + s.light.z;
       if (!(std::fabs(s.light.x) + std::fabs(s.light.y) + std::fabs(s.light.z) <= kMostLight)) {
         counts.dropped++;
@@ -180,7 +232,7 @@ void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<
       }
       const float limit = in.settings.walk.clamp_indirect;
       const Rgb light = glm::max(sum > limit ? s.light * (limit / sum) : s.light, Rgb(0.0f));
-      out.push_back({in.grid.cell(s.position, owner_of(s.instance, s.face_normal), at), light, 1});
+      out.push_back({in.grid.cell(s.position, owner, at), light, 1});
     }
   }
 }
@@ -189,16 +241,17 @@ void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<
 
 bool CachingSettings::operator==(const CachingSettings& o) const {
   const WalkLimits &a = walk.limits, &b = o.walk.limits;
-  return store == o.store && length == o.length && cell_pixels == o.cell_pixels && a.max_bounces == b.max_bounces &&
-         a.diffuse == b.diffuse && a.glossy == b.glossy && a.transmission == b.transmission &&
-         a.transparent == b.transparent && a.caustics_reflective == b.caustics_reflective &&
-         a.caustics_refractive == b.caustics_refractive && walk.clamp_indirect == o.walk.clamp_indirect;
+  return store == o.store && length == o.length && cell_pixels == o.cell_pixels && long_paths == o.long_paths &&
+         a.max_bounces == b.max_bounces && a.diffuse == b.diffuse && a.glossy == b.glossy &&
+         a.transmission == b.transmission && a.transparent == b.transparent &&
+         a.caustics_reflective == b.caustics_reflective && a.caustics_refractive == b.caustics_refractive &&
+         walk.clamp_indirect == o.walk.clamp_indirect;
 }
 
-std::vector<Sample> cache_paths(const WalkScene& walk, const Grid& grid, const CachingSettings& settings,
-                                std::span<const CachePoint> points, uint32_t seed, const Work& work,
-                                RayCounts& counts) {
-  PathInput in{walk, grid, settings, settings.walk.limits, seed};
+std::vector<Sample> cache_paths(const WalkScene& walk, const Grid& grid, const Table& table,
+                                const CachingSettings& settings, std::span<const CachePoint> points, uint32_t seed,
+                                const Work& work, RayCounts& counts) {
+  PathInput in{walk, grid, table, settings, settings.walk.limits, seed};
   if (settings.length) in.limits.max_bounces = std::min(in.limits.max_bounces, settings.length);
   const bool straight = walk.scene.effects.has(kTransparency) || walk.scene.effects.has(kRayVisibility) || walk.shown;
   std::vector<std::vector<Sample>> blocks((points.size() + kBlock - 1) / kBlock);

@@ -16,15 +16,20 @@ namespace afterglow::hash_cache {
 
 struct CachingSettings {
   WalkSettings walk;
-  uint32_t store = 3;        // diffuse vertices of a path that keep a sample, the asking point included (l_store)
-  uint32_t length = 0;       // further vertices whose light each of them gets (l_len); 0: as the bounce limits say
-  float cell_pixels = 4.0f;  // width of the finest cells in pixels
+  uint32_t store = 3;         // diffuse vertices of a path that keep a sample, the asking point included (l_store)
+  uint32_t length = 0;        // further vertices whose light each of them gets (l_len); 0: as the bounce limits say
+  float cell_pixels = 4.0f;   // width of the finest cells in pixels
+  float long_paths = 0.125f;  // share of the paths that never end in a cell
   bool operator==(const CachingSettings& o) const;
 };
 
-/// Paths from all points, each a function of its point and of `seed` alone: samples in the order of the points.
-/// Nothing, when stopped.
-std::vector<Sample> cache_paths(const WalkScene&, const Grid&, const CachingSettings&,
+/// Surfaces that a path meets later are met by other laws than the camera's: mixed into its cells they would pull the
+/// mean towards the part of a cell that faces other surfaces. They fill larger cells of their own.
+inline constexpr int kFartherLevels = 2;
+
+/// Paths from all points, each a function of its point, of `seed` and of what the table holds: samples in the order of
+/// the points. Most paths end at their second surface, where a cell on the way knows the rest. Nothing, when stopped.
+std::vector<Sample> cache_paths(const WalkScene&, const Grid&, const Table&, const CachingSettings&,
                                 std::span<const CachePoint> points, uint32_t seed, const Work&, RayCounts&);
 
 /// A number of its own for every question of an image.

@@ -27,6 +27,9 @@ inline uint32_t side_of(const Vec3& n) {
   const uint32_t axis = a.x >= a.y && a.x >= a.z ? 0u : a.y >= a.z ? 1u : 2u;
   return 2 * axis + (n[int(axis)] < 0.0f ? 1u : 0u);
 }
+/// Beside its own cells, every owner has those that were filled by paths on their way: their light has been reflected
+/// once less, so that a path which ends in them has been reflected as often as any other.
+inline constexpr uint32_t kOnTheWay = 0x80000000u;
 inline uint32_t owner_of(uint32_t instance, const Vec3& face_normal) { return instance * 8u + side_of(face_normal); }
 
 inline Cell parent(const Cell& c) { return {c.x >> 1, c.y >> 1, c.z >> 1, c.owner, c.level + 1}; }
@@ -80,6 +83,11 @@ class Grid {
   float finest_ = 1.0f;
   Vec3 corner_{0.0f};
 };
+
+/// Cells that hold more than `enough` samples get paths more rarely, down to one where eight would be sent.
+inline float share_of_paths(uint32_t count, float enough) {
+  return std::clamp(enough / float(count + 1), 0.125f, 1.0f);
+}
 
 /// How much of a level's light is taken when `count` samples stand in its cell and `wanted` are trusted fully.
 inline float trust(uint32_t count, float wanted) { return std::min(1.0f, float(count) / wanted); }

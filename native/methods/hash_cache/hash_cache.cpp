@@ -9,6 +9,7 @@ namespace afterglow::hash_cache {
 
 namespace {
 
+constexpr uint32_t kLights = 4;
 constexpr const char* kViews[] = {"LIGHT", "LEVEL", "COUNT", "AGE", "SIDE"};
 
 View view_of(const SettingValue& value) {
@@ -21,13 +22,17 @@ View view_of(const SettingValue& value) {
 
 class HashCache final : public IndirectMethod {
  public:
-  MethodTraits traits() const override { return {.layers = filter_}; }
+  MethodTraits traits() const override { return {.layers = filter_, .running = running_, .lights = lights_}; }
 
   void configure(const Settings& settings) override {
     CacheSettings s;
     filter_ = true;
+    running_ = true;
+    lights_ = kLights;
     s.caching.walk.configure(settings);
+    bool denoised = false;
     for (const auto& [name, value] : settings) {
+      if (name == "denoise") denoised = integer_of(value) != 0;
       if (name == "hash_store") s.caching.store = uint32_t(integer_of(value));
       if (name == "hash_length") s.caching.length = uint32_t(integer_of(value));
       if (name == "hash_cell") s.caching.cell_pixels = float(number_of(value));
@@ -37,8 +42,13 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_keep") s.keep = uint32_t(integer_of(value));
       if (name == "hash_memory") s.limit = size_t(number_of(value) * 1048576.0);
       if (name == "hash_filter") filter_ = integer_of(value) != 0;
+      if (name == "hash_enough") s.enough = float(number_of(value));
+      if (name == "hash_running") running_ = integer_of(value) != 0;
+      if (name == "hash_lights") lights_ = uint32_t(integer_of(value));
+      if (name == "hash_long_paths") s.caching.long_paths = float(number_of(value));
       if (name == "hash_view") s.view = view_of(value);
     }
+    filter_ &= !denoised;  // what filters the whole picture does better with grain than with what this one leaves
     cache_.configure(s);
   }
 
@@ -78,7 +88,8 @@ class HashCache final : public IndirectMethod {
 
  private:
   Cache cache_;
-  bool filter_ = true;
+  bool filter_ = true, running_ = true;
+  uint32_t lights_ = kLights;
 };
 
 }  // namespace
@@ -96,6 +107,11 @@ MethodDescription describe() {
   add("hash_store", "Stored Surfaces", "Diffuse surfaces of a path that keep a sample", "", int64_t(3), 1.0, 16.0);
   add("hash_length", "Path Length", "Further surfaces whose light each of them gets; 0: as the bounce limits say", "",
       int64_t(0), 0.0, 1024.0);
+  add("hash_long_paths", "Long Paths",
+      "Share of the paths that go their whole way; the others end at their second surface where a cell knows the rest",
+      "", 0.125, 0.01, 1.0);
+  add("hash_lights", "Light Samples", "Times that light sources are asked at the surface that a pixel shows", "",
+      int64_t(kLights), 1.0, 64.0);
   add("hash_resolution", "Caching Resolution",
       "Paths that fill the cache, as a share of the image's width and height; what no cell answers is filled anyway",
       "", 1.0, 0.0, 1.0);
@@ -103,7 +119,13 @@ MethodDescription describe() {
       0.5, 0.0, 4.0);
   add("hash_trusted", "Trusted Samples", "Samples from which on a cell answers alone; below, larger ones help", "",
       32.0, 1.0, 1e6);
+  add("hash_enough", "Settled Samples",
+      "Samples from which on a cell gets paths more rarely, down to one where eight would be sent", "", 512.0, 1.0,
+      1e9);
   add("hash_filter", "Layered Filter", "Smooths light between neighbouring pixels while cells hold few samples", "",
+      true, 0.0, 1.0);
+  add("hash_running", "Running Estimate",
+      "Renders of a scene and view that did not change since the last, but for the seed, go on with its picture", "",
       true, 0.0, 1.0);
   add("hash_keep", "Keep at Edits",
       "Samples that a cell keeps when the scene changes, so that the image stays useful while it heals; 0: none", "",

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Timed look-ups in random order: see measure.h.
+#include "methods/hash_cache/measure.h"
+
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
+#include "methods/hash_cache/cuckoo.h"
+#include "methods/hash_cache/table.h"
+
+namespace afterglow::hash_cache {
+
+namespace {
+
+constexpr uint32_t kInBlock = 6;
+constexpr int kRounds = 3;  // the fastest counts
+volatile uint32_t sink;     // what was read has been read
+
+template <class Look>
+double speed(uint64_t lookups, const Look& look) {
+  double best = 0.0;
+  for (int round = 0; round < kRounds; ++round) {
+    const auto begun = std::chrono::steady_clock::now();
+    uint32_t sum = 0;
+    for (uint64_t i = 0; i < lookups; ++i) sum += look(mix(i + 1));
+    sink = sum;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    best = std::max(best, double(lookups) / std::max(seconds, 1e-9));
+  }
+  return best;
+}
+
+/// The cell with this number: six neighbours in each block of 4 × 4 × 2, blocks along a long strip.
+Cell cell_of(uint64_t number) {
+  const uint64_t block = number / kInBlock, in = number % kInBlock;
+  return {int32_t(4 * (block & 0x3ff) + (in & 3)), int32_t(4 * (block >> 10 & 0x3ff) + (in >> 2)),
+          int32_t(2 * (block >> 20)), 0, 0};
+}
+
+}  // namespace
+
+LookupSpeeds measure_lookups(uint64_t cells, uint64_t lookups) {
+  LookupSpeeds out;
+  cells = std::max<uint64_t>(cells / kInBlock, 1) * kInBlock;
+  const auto pick = [&](uint64_t random) { return uint64_t((unsigned __int128)random * cells >> 64); };
+  {
+    std::vector<Record> records(cells);
+    for (uint64_t i = 0; i < cells; ++i) {
+      records[i].key = key_of(cell_of(i));
+      records[i].word = uint32_t(i);
+    }
+    out.reads = speed(lookups, [&](uint64_t random) { return records[pick(random)].word; });
+    Table table;
+    table.restore(records);
+    out.table_bytes = table.bytes();
+    out.table = speed(lookups, [&](uint64_t random) { return table.find(cell_of(pick(random)))->word; });
+  }
+  std::vector<Block> blocks(cells / kInBlock);
+  for (uint64_t i = 0; i < blocks.size(); ++i) blocks[i] = {uint32_t(i), 0x3fu, uint32_t(i * kInBlock)};
+  CuckooMap map;
+  map.build(blocks);
+  std::vector<Record> data(cells);
+  out.map_bytes = map.bytes() + data.size() * sizeof(Record);
+  out.map = speed(lookups, [&](uint64_t random) {
+    const uint64_t number = pick(random);
+    const uint32_t bit = uint32_t(number % kInBlock);
+    const Block* block = map.find(uint32_t(number / kInBlock));
+    return data[block->first + uint32_t(std::popcount(block->bits & ((1u << bit) - 1u)))].word;
+  });
+  return out;
+}
+
+}  // namespace afterglow::hash_cache

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far HashCache images are from the truth, in samples of path tracing; how still a still view stands; what comes back when
+the camera comes back; what the layered filter does for mirrored and refracted things; whether threads matter."""
+
+from __future__ import annotations
+
+import statistics
+
+import numpy as np
+
+from ... import api, metrics
+from ...scenes.rooms import cornell_box
+from ..figure import Context, Figure
+from . import walk
+
+FRAMES, SAMPLES = 100, 64
+MEASURED = (0, 24, 49, 74, 99)
+REFERENCE = 512  # samples of each half
+
+
+def camera_path(context: Context) -> list[Figure]:
+    """64 samples of HashCache in each of 100 frames, five of them measured, against the path tracer's c / N."""
+    size = walk.SMALL
+    jobs = [walk.render(f / FRAMES, 100 + f, SAMPLES, f"f{f}" if f in MEASURED else None) for f in range(FRAMES)]
+    answers, images = walk.run(jobs, size)
+    worth, errors, costs = [], [], []
+    for f in MEASURED:
+        truth = walk.halves(f / FRAMES, REFERENCE, size)
+        found = metrics.halves_relmse(images[f"f{f}"], truth)
+        cost, _ = walk.path_tracing_cost(f / FRAMES, truth, size)
+        errors.append(tuple(found))
+        costs.append(cost)
+        worth.append(cost / max(found.value, 1e-6))
+        context.say(f"      frame {f}: relMSE {found.value:.5f} ± {found.error:.5f}, as {worth[-1]:.0f} samples of path tracing")
+    seconds = sum(a["seconds"] for a in answers[1:])
+    return [Figure("path-traced samples that 64 samples are worth, camera path", f"country_kitchen {size[0]}×{size[1]}",
+                   statistics.mean(worth), "samples", "figure 11 of the paper", 4096, None, "≥ 4096",
+                   details={"errors": errors, "costs": costs, "worth": worth, "seconds": seconds}).judged()]
+
+
+def single_frame(context: Context) -> list[Figure]:
+    """The same for one frame with an empty cache; the errors at 1, 4, 16 and 64 samples stand in the details (figure 11)."""
+    truth = walk.halves(None, REFERENCE, walk.SIZE)
+    cost, path = walk.path_tracing_cost(None, truth, walk.SIZE)
+    errors, seconds = {}, {}
+    for n in (1, 4, 16, SAMPLES):
+        answers, images = walk.run([walk.render(None, 5, n, "image")])
+        errors[n], seconds[n] = metrics.halves_relmse(images["image"], truth).value, answers[1]["seconds"]
+        context.say(f"      {n} samples: relMSE {errors[n]:.5f}, {seconds[n]:.1f} s")
+    return [Figure("path-traced samples that 64 samples are worth, first frame", "country_kitchen 640×360",
+                   cost / max(errors[SAMPLES], 1e-6), "samples", "", None, None, "≥ 1024",
+                   details={"errors": errors, "path_tracing": path, "cost": cost, "seconds": seconds}).judged()]
+
+
+def still(context: Context) -> list[Figure]:
+    """Frames of a still view at 16 samples, a new seed each, after a second of them."""
+    jobs = [walk.render(None, 200 + f, 16, f"f{f}" if f >= 24 else None) for f in range(30)]
+    _, images = walk.run(jobs)
+    frames = [images[f"f{f}"] for f in range(24, 30)]
+    found = metrics.still_flicker(frames, np.mean(frames, axis=0))
+    return [Figure("flicker of a still view, 16 samples a frame", "country_kitchen 640×360", 100 * found.value, "%",
+                   "Cycles 5.0 with OpenImageDenoise, 16 samples", 2.5, None, "≤ 0.3", spread=100 * found.error,
+                   note="" if found.value <= 0.003 else f"{100 * found.value:.2f} %").judged()]
+
+
+def returning(context: Context) -> list[Figure]:
+    """The camera leaves and comes back: twice the noise's variance is what two images may differ by."""
+    apart = {"hash_running": False}
+    jobs = [walk.render(0.0, 1, 16, **apart)] * 2
+    jobs += [walk.render(0.0, 2, 16, "first", **apart), walk.render(0.0, 3, 16, "again", **apart)]
+    jobs += [walk.render(f / 10, 10 + f, 16, **apart) for f in range(1, 10)]
+    jobs += [walk.render(0.0, 30, 16, "back", **apart)]
+    _, images = walk.run(jobs, walk.SMALL)
+    noise = float(((images["first"] - images["again"]) ** 2).mean())
+    change = float(((images["first"] - images["back"]) ** 2).mean())
+    return [Figure("image change on returning, over that between two seeds", "country_kitchen 192×108", change / noise, "", "",
+                   None, None, "≤ 1.1").judged()]
+
+
+def layers(context: Context) -> list[Figure]:
+    """MS-SSIM of mirrored and refracted rooms at one sample, with the layered filter over without."""
+    figures = []
+    for variant in ("mirror", "glass"):
+        room = cornell_box(variant)
+        common = {"width": 192, "height": 192, "diffuse_bounces": 4}
+        truth = api.render(room, method="PATH_TRACING", samples=2048, seed=9, **common).image
+        values = {on: statistics.mean(metrics.ms_ssim(
+            api.render(room, method="HASH_CACHE", samples=1, seed=s, hash_filter=on, **common).image, truth) for s in range(3))
+            for on in (True, False)}
+        figures.append(Figure("MS-SSIM with layered filter over without", f"cornell_box, {variant}", values[True], "",
+                              "without filter", values[False], values[True] / values[False], "≥ 1.0").judged())
+    return figures
+
+
+def threads(context: Context) -> list[Figure]:
+    """Largest difference between one and two threads, kitchen."""
+    images = [walk.run([walk.render(None, 3, 4, "image", threads=n)], walk.SMALL)[1]["image"] for n in (1, 2)]
+    most = float(np.abs(images[0] - images[1]).max())
+    return [Figure("largest difference between 1 and 2 threads", "country_kitchen 192×108", most, "",
+                   "", None, None, "= 0").judged()]
