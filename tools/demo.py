@@ -34,10 +34,14 @@ def render(output: Path, samples: int) -> None:
     from render_afterglow.library import afterglow
 
     figures = afterglow.statistics(scene)
-    error = figures.get("believed_error")
+    error, noise = figures.get("believed_error"), figures.get("noise")
+    if isinstance(error, float):
+        believed = f"{error:.2%} (estimated, relative)"
+    else:
+        believed = f"not known; noise {noise:.2%}, the method's bias aside" if isinstance(noise, float) else "not estimated"
     print("\n".join(("", f"picture    {output}", f"method     {figures.get('method', 'unknown')}",
           f"samples    {figures.get('samples', 'unknown')} per pixel", f"wall time  {seconds:.2f} s",
-          "error      " + (f"{error:.2%} (estimated, relative)" if isinstance(error, float) else "not estimated"))))
+          f"error      {believed}")))
     for warning in figures.get("warnings", ()):
         print(f"warning    {warning}")
 
