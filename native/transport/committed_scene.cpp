@@ -4,6 +4,8 @@
 
 #include <chrono>
 
+#include "base/memory.h"
+
 namespace afterglow {
 
 namespace {
@@ -31,11 +33,16 @@ SceneChanges CommittedScene::commit(RayCaster::Options options) {
   SceneChanges changes = scene.commit();
   changes.everything |= broken;
   broken = true;  // until all layers have followed
+  // A final render is about to hold most of what it ever will: what reading the scene, and then building, left over
+  // would stand on top of it.
+  const bool final_render = options.flatten == RayCaster::Flatten::kAlways;
+  if (final_render) release_free_memory();
   rays.commit(scene, changes, options);
   materials.commit(scene, changes, changes.warnings);
   lights.commit(scene, changes, materials, changes.warnings);
   effects = all_effects(*this);
   broken = false;
+  if (final_render) release_free_memory();
   commit_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return changes;
 }
