@@ -121,6 +121,11 @@ class Sampler {
     fetch(d >> 2);
     return {values_[d & 3], values_[(d & 3) + 1]};
   }
+  /// The four coordinates of one block at once: dimensions 4 block to 4 block + 3. Leaves the stream where it is.
+  std::array<float, 4> block(uint32_t block) const {
+    const sobol::Lanes x = sobol::block(seed_, index_, block);
+    return {unit_float(x[0]), unit_float(x[1]), unit_float(x[2]), unit_float(x[3])};
+  }
   void set_dimension(uint32_t dimension) { dimension_ = dimension; }
   uint32_t dimension() const { return dimension_; }
 

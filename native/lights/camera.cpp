@@ -61,14 +61,15 @@ CameraRays::CameraRays(const Camera& camera, const DVec3& origin, uint32_t width
       size_(float(std::max(width, 1u)), float(std::max(height, 1u))) {
   if (!(camera_.aperture_ratio > 0.0f)) camera_.aperture_ratio = 1.0f;
   if (!(camera_.aperture_radius > 0.0f) || !(camera_.focus_distance > 0.0f)) camera_.aperture_radius = 0.0f;
+  extent_ = Vec2(camera_.window.y - camera_.window.x, camera_.window.w - camera_.window.z);
+  lens_ = camera_.aperture_radius > 0.0f && camera_.kind != CameraKind::kPanorama;
+  pinhole_ = !lens_ && camera_.kind == CameraKind::kPerspective;
 }
-
-bool CameraRays::needs_lens() const { return camera_.aperture_radius > 0.0f && camera_.kind != CameraKind::kPanorama; }
 
 CameraRay CameraRays::ray(const Vec2& pixel, const Vec2& lens) const {
   const Vec2 at = pixel / size_;
   const Vec4& window = camera_.window;
-  const Vec2 extent(window.y - window.x, window.w - window.z), step = extent / size_;
+  const Vec2 step = extent_ / size_;
   CameraRay out;
   Vec3 position(0.0f), direction(0, 0, -1), dx(0.0f), dy(0.0f);
   float along_axis = 1.0f;  // cosine between ray and view axis: clipping is a pair of planes
@@ -77,7 +78,7 @@ CameraRay CameraRays::ray(const Vec2& pixel, const Vec2& lens) const {
     dx = panorama_direction(camera_.panorama, at + Vec2(1.0f / size_.x, 0.0f)) - direction;
     dy = panorama_direction(camera_.panorama, at + Vec2(0.0f, 1.0f / size_.y)) - direction;
   } else {
-    const Vec2 on_window = Vec2(window.x, window.z) + extent * at;
+    const Vec2 on_window = Vec2(window.x, window.z) + extent_ * at;
     const bool orthographic = camera_.kind == CameraKind::kOrthographic;
     if (orthographic) {
       position = Vec3(on_window, 0.0f);
@@ -90,7 +91,7 @@ CameraRay CameraRays::ray(const Vec2& pixel, const Vec2& lens) const {
       dx = unit_derivative(direction, length, {step.x, 0, 0});
       dy = unit_derivative(direction, length, {0, step.y, 0});
     }
-    if (needs_lens()) {
+    if (lens_) {
       const Vec3 focus = position + direction * (camera_.focus_distance / -direction.z);
       position += Vec3(lens_point(camera_, lens), 0.0f);
       direction = glm::normalize(focus - position);

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 
-#include "lights/emissive_mesh.h"
 #include "lights/lamp.h"
 #include "lights/lamp_bvh.h"
 #include "lights/light_tree.h"
@@ -102,6 +101,7 @@ struct Lights::State {
   void collect_emission();
   void build_tree();
   void build_world();
+  bool find_lone(LoneLight&) const;
 
   bool shares(const Vec3& position, const Vec3& normal, Shares&) const;
   float suns_weight(const Vec3& normal) const;
@@ -181,6 +181,15 @@ void Lights::State::build_world() {
     world_weight = kPi * world_map.mean();
   }
   if (!(world_weight > 0.0f) || !std::isfinite(world_weight)) world_weight = 0.0f;
+}
+
+bool Lights::State::find_lone(LoneLight& lone) const {
+  if (!lamps.empty() || !suns.empty() || world_weight > 0.0f || meshes.patches().size() != 1) return false;
+  const EmissivePatch& patch = meshes.patches()[0];
+  const Emission& e = emission[patch.material];
+  if (!e.constant || !is_finite(e.mean) || is_black(e.mean)) return false;
+  lone = {patch, e.mean, scene->instances()[patch.instance].visibility};
+  return true;
 }
 
 float Lights::State::suns_weight(const Vec3& normal) const {
@@ -298,6 +307,7 @@ void Lights::commit(const Scene& scene, const SceneChanges& changes, const Mater
   if (emitters) s.collect_emission();
   if (lights || emitters) s.build_tree();
   if (all || changes.world || !changes.images_edited.empty()) s.build_world();
+  has_lone_ = s.find_lone(lone_);
 }
 
 Effects Lights::effects() const {
@@ -321,6 +331,14 @@ size_t Lights::bytes() const {
 bool Lights::sample(const Vec3& position, const Vec3& normal, float u_light, const Vec2& u, LightSample& out) const {
   const State& s = *state_;
   out = LightSample{};
+  if (has_lone_) {
+    LoneSample sample(lone_);
+    if (!sample_lone(lone_, position, normal, u, sample)) return false;
+    out.direction = sample.direction, out.distance = sample.distance, out.density = sample.density;
+    out.margin = sample.margin, out.radiance = sample.radiance;
+    out.visibility = lone_.visibility, out.light = 0;
+    return out.density > 0.0f && out.density < kInfinity;
+  }
   Shares shares;
   if (!s.shares(position, normal, shares)) return false;
   float rest = u_light;
@@ -353,11 +371,12 @@ float Lights::density_of_triangle(const Vec3& position, const Vec3& normal, cons
   const State& s = *state_;
   const uint32_t index = s.meshes.find(emitter.instance, emitter.triangle);
   if (index == kNone) return 0.0f;
-  Shares shares;
-  if (!s.shares(position, normal, shares) || !(shares.weight[kTree] > 0.0f)) return 0.0f;
   const Vec3 to_point = emitter.position - position;
   const float distance = glm::length(to_point);
   if (!(distance > 0.0f)) return 0.0f;
+  if (has_lone_) return patch_density(lone_.patch, position, normal, to_point / distance, distance);
+  Shares shares;
+  if (!s.shares(position, normal, shares) || !(shares.weight[kTree] > 0.0f)) return 0.0f;
   const float probability = s.tree.probability(uint32_t(s.lamps.size()) + index, position, normal);
   const float density = patch_density(s.meshes.patches()[index], position, normal, to_point / distance, distance);
   return shares.weight[kTree] * probability * density;

@@ -6,6 +6,7 @@
 
 #include <memory>
 
+#include "lights/emissive_mesh.h"
 #include "materials/materials.h"
 
 namespace afterglow {
@@ -31,6 +32,26 @@ struct LightHit {
   uint32_t visibility = kVisibleAll;
 };
 
+/// The emitter of a scene that has no other and whose whole surface shines alike: nothing is to be chosen.
+struct LoneLight {
+  EmissivePatch patch;
+  Rgb radiance{0.0f};
+  uint32_t visibility = kVisibleAll;
+};
+
+/// What LightSample says of a lone light, without what cannot be otherwise.
+struct LoneSample : PatchSample {
+  const Rgb& radiance;
+  explicit LoneSample(const LoneLight& lone) : radiance(lone.radiance) {}
+  static constexpr bool delta = false, cast_shadow = true;
+};
+
+/// Lights::sample where a lone light is all there is.
+inline bool sample_lone(const LoneLight& lone, const Vec3& position, const Vec3& normal, const Vec2& u,
+                        LoneSample& out) {
+  return sample_patch(lone.patch, position, normal, u, out);
+}
+
 class Lights {
  public:
   Lights();
@@ -42,6 +63,8 @@ class Lights {
 
   /// normal 0: light from all sides counts (translucent surfaces). False: nothing to sample from here.
   bool sample(const Vec3& position, const Vec3& normal, float u_light, const Vec2& u, LightSample&) const;
+  /// Null: there are several lights, or none. sample() asks it, too; a walk that does so first saves the call.
+  const LoneLight* lone() const { return has_lone_ ? &lone_ : nullptr; }
   /// The density with which sample() at (position, normal) would have chosen this hit's direction.
   float density_of_triangle(const Vec3& position, const Vec3& normal, const SurfacePoint& emitter) const;
   float density_of_light(const Vec3& position, const Vec3& normal, const Vec3& direction, const LightHit&) const;
@@ -66,6 +89,8 @@ class Lights {
   void visit_hits(const Ray&, void (*visit)(const void*, const LightHit&), const void* context) const;
   struct State;
   std::unique_ptr<State> state_;
+  LoneLight lone_;
+  bool has_lone_ = false;
 };
 
 }  // namespace afterglow

@@ -116,8 +116,8 @@ Vec2 RectangleView::invert(const Vec2& point) const {
   const float xu = x0_ + std::clamp(point.x, 0.0f, 1.0f) * length_u_,
               yv = y0_ + std::clamp(point.y, 0.0f, 1.0f) * length_v_;
   const float n1 = xu / std::sqrt(z0_ * z0_ + xu * xu);
-  auto angle = [](float a, float b) { return std::acos(std::clamp(-a * b, -1.0f, 1.0f)); };
-  const float before = angle(b0_, n1) + angle(n1, b1_) - k_;
+  const Four angles = arc_cosine(Four{-b0_ * n1, -n1 * b1_, 0.0f, 0.0f});
+  const float before = angles[0] + angles[1] - k_;
   const float d2 = xu * xu + z0_ * z0_;
   const float h0 = y0_ / std::sqrt(d2 + y0_ * y0_), h1 = y1_ / std::sqrt(d2 + y1_ * y1_);
   const float hv = yv / std::sqrt(d2 + yv * yv);

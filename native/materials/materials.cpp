@@ -89,6 +89,13 @@ Rgb estimate_emission(const Program& program, const Images& images) {
   return sum / float(count);
 }
 
+PlainMaterial plain_of(const Program& program) {
+  const Surface& s = program.ready;
+  if (!program.folded || s.count > 1 || s.holdout > 0.0f || !is_black(s.transparency)) return {};
+  if (s.count && s.lobes[0].kind != LobeKind::kLambert) return {};
+  return {s.count ? s.lobes[0].weight : Rgb(0.0f), s.emission, true, s.count > 0};
+}
+
 }  // namespace
 
 Compiled Materials::State::compile_material(const Scene& scene, Handle handle, std::vector<std::string>& warnings) {
@@ -144,6 +151,13 @@ void Materials::commit(const Scene& scene, const SceneChanges& changes, std::vec
   for (size_t k = 0; k < handles.size(); ++k) {
     Compiled& m = s.materials[k];
     if (everything || fresh[k]) m.mean_emission = estimate_emission(m.emission, s.images);
+  }
+  plain_.assign(handles.size(), {});
+  all_plain_ = true, some_read_uv_ = false;
+  for (size_t k = 0; k < handles.size(); ++k) {
+    plain_[k] = plain_of(s.materials[k].surface);
+    all_plain_ &= plain_[k].plain;
+    some_read_uv_ |= s.materials[k].surface.reads_uv;
   }
   const bool geometry = !changes.meshes_added.empty() || !changes.meshes_replaced.empty() ||
                         !changes.meshes_removed.empty() || !changes.meshes_deformed.empty() ||

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "materials/surface.h"
 #include "rays/surface_point.h"
@@ -19,6 +20,10 @@ class Materials {
   void commit(const Scene&, const SceneChanges&, std::vector<std::string>& warnings);
   Effects effects() const;  // of all materials and the world
   uint32_t material_effects(uint32_t material) const;
+  /// For dense material indices of a committed scene.
+  const PlainMaterial& plain(uint32_t material) const { return plain_[material]; }
+  bool all_plain() const { return all_plain_; }  // the path's context means nothing to any
+  bool some_read_uv() const { return some_read_uv_; }
   bool reads_uv(uint32_t material) const;  // needs SurfacePoint::uv
 
   /// The lobes, emission and transparency at a point. material = point.material.
@@ -41,6 +46,8 @@ class Materials {
  private:
   struct State;
   std::unique_ptr<State> state_;
+  std::vector<PlainMaterial> plain_;
+  bool all_plain_ = false, some_read_uv_ = false;
 };
 
 }  // namespace afterglow

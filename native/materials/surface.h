@@ -136,15 +136,44 @@ BsdfValue evaluate<false>(const Surface&, const Vec3& face_normal, const Vec3& o
 template <>
 BsdfSample sample<false>(const Surface&, const Vec3& face_normal, const Vec3& outgoing, float u_lobe, const Vec2& u);
 
+/// Emission and one Lambert lobe, or none: all that those need to know of a material who know nothing else.
+struct PlainMaterial {
+  Rgb albedo{0.0f}, emission{0.0f};
+  bool plain = false;     // in a table: the material is so everywhere; else the above means nothing
+  bool scatters = false;  // has the lobe
+};
+
+struct LambertSurface {
+  const PlainMaterial& material;
+  const Vec3& normal;
+  const Rgb& emission = material.emission;
+};
+
+/// Density of a direction; times the albedo, it is BSDF × cosine. False: the direction does not leave the surface.
+inline bool lambert_density(const Vec3& normal, const Vec3& face_normal, const Vec3& incoming, float& density) {
+  const float cosine = glm::dot(normal, incoming);
+  if (cosine <= 0.0f || glm::dot(face_normal, incoming) <= 0.0f) return false;
+  density = cosine * kInvPi;
+  return true;
+}
+
+/// Chooses a direction. False: it does not leave the surface.
+inline bool sample_lambert(const Vec3& normal, const Vec3& face_normal, const Vec2& u, Vec3& direction,
+                           float& density) {
+  const float radius = std::sqrt(u.x), phi = 2.0f * kPi * u.y;
+  const float z = std::sqrt(std::fmax(0.0f, 1.0f - u.x));
+  direction = Frame(normal).to_world({radius * std::cos(phi), radius * std::sin(phi), z});
+  if (z <= 0.0f || glm::dot(face_normal, direction) <= 0.0f) return false;
+  density = z * kInvPi;
+  return true;
+}
+
 template <>
 inline BsdfValue evaluate<true>(const Surface& surface, const Vec3& face_normal, const Vec3&, const Vec3& incoming) {
   BsdfValue value;
-  if (surface.count == 0 || glm::dot(face_normal, incoming) <= 0.0f) return value;
-  const Lobe& lobe = surface.lobes[0];
-  const float cosine = glm::dot(lobe.normal, incoming);
-  if (cosine <= 0.0f) return value;
-  value.density = cosine * kInvPi;
-  value.diffuse = lobe.weight * value.density;
+  if (surface.count == 0) return value;
+  if (lambert_density(surface.lobes[0].normal, face_normal, incoming, value.density))
+    value.diffuse = surface.lobes[0].weight * value.density;
   return value;
 }
 
@@ -152,14 +181,8 @@ template <>
 inline BsdfSample sample<true>(const Surface& surface, const Vec3& face_normal, const Vec3&, float, const Vec2& u) {
   BsdfSample result;
   if (surface.count == 0) return result;
-  const Lobe& lobe = surface.lobes[0];
-  const float radius = std::sqrt(u.x), phi = 2.0f * kPi * u.y;
-  const float z = std::sqrt(std::fmax(0.0f, 1.0f - u.x));
-  result.direction = Frame(lobe.normal).to_world({radius * std::cos(phi), radius * std::sin(phi), z});
-  if (z <= 0.0f || glm::dot(face_normal, result.direction) <= 0.0f) return result;
-  result.value.density = z * kInvPi;
-  result.value.diffuse = lobe.weight * result.value.density;
-  result.valid = true;
+  result.valid = sample_lambert(surface.lobes[0].normal, face_normal, u, result.direction, result.value.density);
+  if (result.valid) result.value.diffuse = surface.lobes[0].weight * result.value.density;
   return result;
 }
 

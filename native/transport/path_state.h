@@ -94,6 +94,15 @@ inline bool count_bounce(PathContext& c, const WalkLimits& limits, LobeClass pas
   return last;
 }
 
+/// Of all classes of lobes, or of the diffuse one where a kernel knows no other.
+template <bool kLobes>
+inline Rgb total(const BsdfValue& value) {
+  if constexpr (kLobes)
+    return value.total();
+  else
+    return value.diffuse;
+}
+
 /// Probability with which a path goes on. The first bounce always does; the root is close to what a display shows of
 /// the loss.
 inline float survival(const Rgb& throughput, uint32_t depth, uint32_t transparent_depth) {

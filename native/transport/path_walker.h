@@ -5,11 +5,11 @@
 // A visitor has
 //   bool surface(const PathState&, const SurfacePoint&, const Surface&)   a vertex; false ends the walk here
 //   void lit(const PathState&, const BsdfValue&, const Rgb& light)        light found: throughput × value × light
-//   arrives void scattered(const PathState&, const BsdfSample&)                   before the throughput takes the
-//   sample's weight void emitted(const PathState&, const Rgb& light)                      light run into, weighted;
-//   throughput not applied void escaped(const PathState&, const Rgb& light)                      the same of the world,
-//   and of nothing at all void held_out(const PathState&, float share)                          a holdout seen from the
-//   camera
+//                                                                         arrives
+//   void scattered(const PathState&, const BsdfSample&)      before the throughput takes the sample's weight
+//   void emitted(const PathState&, const Rgb& light)         light run into, weighted; throughput not applied
+//   void escaped(const PathState&, const Rgb& light)         the same of the world, and of nothing at all
+//   void held_out(const PathState&, float share)             a holdout seen from the camera
 // A visitor that names a type SplitsDiffuse is also told
 //   void diffuse(const PathState&, const SurfacePoint&, const Surface& diffuse_lobes)
 //   uint32_t lights(const PathState&)         how many times light sources are asked here
@@ -22,7 +22,12 @@
 //   void turned(const BsdfSample&)        a direction was asked for, valid or not, after the choice not to go straight
 //   Rgb carried(const Rgb& factor)        what the throughput was multiplied with, for whatever reason
 // and answers with the throughput by which roulette decides from there on.
+// A visitor whose kIgnoresSurfaces is true is not told of surfaces. Where a kernel knows nothing but Lambert's lobe, no
+// list of lobes is made then.
 #pragma once
+
+#include <algorithm>
+#include <new>
 
 #include "base/cancel.h"
 #include "base/sampler.h"
@@ -47,7 +52,8 @@ Rgb transmittance(const WalkScene&, Ray, const PathContext&, RayCounts&);
 
 /// From a surface to a light, neither of which the ray may meet: it begins and ends off them, so that its direction is
 /// not quite the sample's where the light stands close before the surface. Lamps have no surface, but often lie in one.
-inline Ray shadow_ray(const SurfacePoint& from, const LightSample& light) {
+template <class Light>
+inline Ray shadow_ray(const SurfacePoint& from, const Light& light) {
   Ray ray;
   ray.origin = offset_origin(from, light.direction);
   ray.direction = light.direction;
@@ -77,65 +83,99 @@ inline constexpr bool kMayAnswer = requires {
   typename Visitor::MayAnswer;
 };
 
+template <class Visitor>
+inline constexpr bool kIgnores = requires {
+  requires Visitor::kIgnoresSurfaces;
+};
+
 template <uint32_t kFeatures>
 class Walker {
   static constexpr bool kLobes = kFeatures & kFeatureLobes;
   static constexpr bool kStraight = kFeatures & kFeatureStraight;
   static constexpr bool kShapes = kFeatures & kFeatureShapes;
+  template <class Visitor>
+  static constexpr bool kLean = !kLobes && !kStraight && kIgnores<Visitor> && !kSplits<Visitor> && !kCarries<Visitor>;
 
  public:
   Walker(const WalkScene& walk, RayCounts& counts) : walk_(walk), scene_(walk.scene), counts_(counts) {}
 
   template <class Visitor>
   void walk(PathState& path, Sampler& sampler, Visitor& visitor) const {
+    if constexpr (kLean<Visitor>) {
+      if (all_plain_ && (kShapes || lone_)) return walk_on<true>(path, sampler, visitor);
+    }
+    walk_on<false>(path, sampler, visitor);
+  }
+
+ private:
+  /// kKnown, of lean walks: no material needs to be asked, and no light to be chosen but among shapes.
+  template <bool kKnown, class Visitor>
+  void walk_on(PathState& path, Sampler& sampler, Visitor& visitor) const {
+    constexpr bool lean = kLean<Visitor>;
     counts_.camera++;
     for (uint32_t vertex = 0;; ++vertex) {
       Hit hit;
       visitor.traced(path.ray, false);
       if (!closest(path, hit)) {
-        if constexpr (kShapes) run_into_shapes(path, kInfinity, visitor);
+        if constexpr (kShapes)
+          run_into_shapes(path, kInfinity, visitor);
+        else if (lean && !has_world_ && vertex > 0)
+          return;  // of nothing, only the camera's rays are told
         escape(path, visitor);
         return;
       }
       if constexpr (kShapes) run_into_shapes(path, hit.t, visitor);
-      path.context.ray_length = hit.t;
-      path.context.footprint += path.pixel_angle * hit.t;
-      const SurfacePoint point = point_at(path, hit);
-      Surface surface;
-      scene_.materials.shade(scene_.scene, point, path.context, surface);
+      if constexpr (!kKnown) {
+        path.context.ray_length = hit.t;
+        path.context.footprint += path.pixel_angle * hit.t;
+      }
+      SurfacePoint point = lean ? surface_point(scene_.scene, path.ray, hit, false) : point_at(path, hit);
+      Room room;  // of nothing, until a surface is made there
+      auto&& surface = shade<lean, kKnown>(path, point, room);
       if (!is_black(surface.emission)) visitor.emitted(path, surface.emission * emission_weight(path, point));
       if constexpr (kStraight) {
         if (path.context.kind & PathContext::kCamera && !hold_out(path, point, surface, visitor)) return;
         if (path.context.transparent_depth > walk_.limits.transparent) return;
       }
-      if (path.last) {
-        if (!kStraight || is_black(surface.transparency)) return;
-        surface.count = 0;
+      if (lean ? vertex > most_diffuse_ : path.last) {
+        if constexpr (kStraight) {
+          if (is_black(surface.transparency)) return;
+          surface.count = 0;
+        } else {
+          return;
+        }
       }
-      sampler.set_dimension(kCameraDimensions + vertex * kVertexDimensions);
-      const float u_light = sampler.next1(), u_end = sampler.next1();
-      const Vec2 u_emitter = sampler.next2();
-      if (!visitor.surface(path, point, surface)) return;
-      float straight;
+      if constexpr (lean) {
+        if (!surface.material.scatters) return;
+      }
+      const uint32_t block = (kCameraDimensions + vertex * kVertexDimensions) / 4;
+      const auto [u_light, u_end, u_emitter_x, u_emitter_y] = sampler.block(block);
+      const Vec2 u_emitter(u_emitter_x, u_emitter_y);
+      if constexpr (!kIgnores<Visitor>) {
+        if (!visitor.surface(path, point, surface)) return;
+      }
+      float straight = 0.0f;
       if constexpr (kSplits<Visitor>) {
         Surface diffuse;
         split_diffuse(surface, diffuse);
-        straight = kStraight ? straight_probability(surface) : 0.0f;
+        if constexpr (kStraight) straight = straight_probability(surface);
         if (diffuse.count) visitor.diffuse(path, point, diffuse);
         if (diffuse.count || surface.count)
           ask_lights(path, point, surface, diffuse, 1.0f - straight, u_light, u_emitter, visitor);
+      } else if constexpr (lean) {
+        look_for_light<kKnown>(path, point, surface, u_light, u_emitter, visitor);
       } else if (answered(visitor)) {
         Surface diffuse;
         split_diffuse(surface, diffuse);
-        straight = kStraight ? straight_probability(surface) : 0.0f;
+        if constexpr (kStraight) straight = straight_probability(surface);
         look_for_light(path, point, surface, &diffuse, 1.0f - straight, u_light, u_emitter, visitor);
       } else {
-        straight = kStraight ? straight_probability(surface) : 0.0f;
+        if constexpr (kStraight) straight = straight_probability(surface);
         if (surface.count && straight < 1.0f)
           look_for_light(path, point, surface, nullptr, 1.0f - straight, u_light, u_emitter, visitor);
       }
-      const float u_lobe = sampler.next1(), u_straight = sampler.next1();
-      const Vec2 u = sampler.next2();
+      [[maybe_unused]] const auto [u_lobe, u_straight, u_x, u_y] = sampler.block(block + 1);
+      const Vec2 u(u_x, u_y);
       if constexpr (kStraight) {
         if (straight > 0.0f && u_straight < straight) {
           pass_straight(path, point, surface.transparency / straight);
@@ -144,13 +184,16 @@ class Walker {
           continue;
         }
       }
-      if (!surface.count || !scatter(path, point, surface, 1.0f - straight, u_lobe, u, visitor)) return;
+      if constexpr (lean) {
+        if (!scatter_lambert(path, point, surface, vertex + 1, u)) return;
+      } else {
+        if (!surface.count || !scatter(path, point, surface, 1.0f - straight, u_lobe, u, visitor)) return;
+      }
       if (!survives(path, u_end, visitor)) return;
       counts_.bounce++;
     }
   }
 
- private:
   bool closest(PathState& path, Hit& hit) const {
     if constexpr (kStraight) {
       for (int skipped = 0; skipped < 4096; ++skipped) {
@@ -167,8 +210,37 @@ class Walker {
 
   SurfacePoint point_at(const PathState& path, const Hit& hit) const {
     SurfacePoint point = surface_point(scene_.scene, path.ray, hit, walk_.with_uv);
-    if (!walk_.with_uv && scene_.materials.reads_uv(point.material)) point.uv = surface_uv(scene_.scene, point);
+    if (some_read_uv_ && scene_.materials.reads_uv(point.material)) point.uv = surface_uv(scene_.scene, point);
     return point;
+  }
+
+  struct MadeSurface {
+    Surface surface;
+    PlainMaterial material;
+  };
+  union Room {
+    MadeSurface made;
+    Room() {}
+  };
+
+  /// Lean: a LambertSurface, which looks at the material's own colours where they are the same everywhere. Else:
+  /// the surface made in the room.
+  template <bool kLeanOne, bool kKnown>
+  decltype(auto) shade(const PathState& path, SurfacePoint& point, Room& room) const {
+    if constexpr (kLeanOne) {
+      const PlainMaterial& plain = scene_.materials.plain(point.material);
+      if (kKnown || plain.plain) return LambertSurface{plain, point.normal};
+      if (scene_.materials.reads_uv(point.material)) point.uv = surface_uv(scene_.scene, point);
+      auto& [surface, material] = *new (&room.made) MadeSurface;
+      scene_.materials.shade(scene_.scene, point, path.context, surface);
+      material.emission = surface.emission, material.scatters = surface.count > 0;
+      if (surface.count) material.albedo = surface.lobes[0].weight;
+      return LambertSurface{material, surface.lobes[0].normal};
+    } else {
+      Surface& surface = *new (&room.made.surface) Surface;
+      scene_.materials.shade(scene_.scene, point, path.context, surface);
+      return (surface);
+    }
   }
 
   float emission_weight(const PathState& path, const SurfacePoint& point) const {
@@ -206,7 +278,7 @@ class Walker {
     Rgb light{0.0f};
     const uint32_t mask = visibility_of(path.context.kind);
     path.context.ray_length = kInfinity;
-    if (scene_.materials.has_world() && (scene_.scene.world().visibility & mask)) {
+    if (has_world_ && (scene_.scene.world().visibility & mask)) {
       light = scene_.materials.world(path.ray.direction, path.context);
       if (path.density > 0.0f && !is_black(light))
         light *= power_heuristic(path.density,
@@ -254,6 +326,42 @@ class Walker {
     path.ray.t_min = 0.0f;
   }
 
+  /// The lean way: nothing is chosen where there is a lone light, and nothing but a density is known of a direction.
+  template <bool kKnown, class Visitor>
+  void look_for_light(const PathState& path, const SurfacePoint& point, const LambertSurface& surface, float u_light,
+                      const Vec2& u, Visitor& visitor) const {
+    if constexpr (!kShapes) {
+      if (kKnown || lone_) {
+        LoneSample light(*lone_);
+        if (sample_lone(*lone_, point.position, point.normal, u, light))
+          take_light(path, point, surface, light, visitor);
+        return;
+      }
+    }
+    LightSample light;
+    if (scene_.lights.sample(point.position, point.normal, u_light, u, light))
+      take_light(path, point, surface, light, visitor);
+  }
+
+  template <class Visitor, class Light>
+  void take_light(const PathState& path, const SurfacePoint& point, const LambertSurface& surface, const Light& light,
+                  Visitor& visitor) const {
+    BsdfValue value;
+    if (!lambert_density(surface.normal, point.face_normal, light.direction, value.density)) return;
+    const float factor = (light.delta ? 1.0f : power_heuristic(light.density, value.density)) / light.density;
+    if (light.cast_shadow && shadowed(point, light, visitor)) return;
+    value.diffuse = surface.material.albedo * value.density;
+    visitor.lit(path, value, light.radiance * factor);
+  }
+
+  template <class Visitor, class Light>
+  bool shadowed(const SurfacePoint& point, const Light& light, Visitor& visitor) const {
+    const Ray ray = shadow_ray(point, light);
+    counts_.shadow++;
+    visitor.traced(ray, true);
+    return scene_.rays.occluded(ray);
+  }
+
   template <class Visitor>
   static bool answered(const Visitor& visitor) {
     if constexpr (kMayAnswer<Visitor>)
@@ -278,11 +386,11 @@ class Walker {
 
   template <class Visitor>
   void look_for_light(const PathState& path, const SurfacePoint& point, const Surface& surface,
-                      [[maybe_unused]] const Surface* diffuse, float scatter_share, float u_light, const Vec2& u,
-                      Visitor& visitor, [[maybe_unused]] float share = 1.0f) const {
+                      [[maybe_unused]] const Surface* diffuse, [[maybe_unused]] float scatter_share, float u_light,
+                      const Vec2& u, Visitor& visitor, [[maybe_unused]] float share = 1.0f) const {
     LightSample light;
     if (!scene_.lights.sample(point.position, light_normal(point, surface), u_light, u, light)) return;
-    if (!(light.density > 0.0f) || is_black(light.radiance)) return;
+    if constexpr (!kStraight) scatter_share = 1.0f;  // a constant to the compiler
     BsdfValue value = evaluate<!kLobes>(surface, point.face_normal, point.outgoing, light.direction);
     float weight = 1.0f;
     const bool split = kSplits<Visitor> || (kMayAnswer<Visitor> && diffuse);
@@ -301,48 +409,69 @@ class Walker {
         if (!(light.visibility & kVisibleTransmission)) value.transmission = Rgb(0.0f);
       }
     }
-    if (is_black(value.total())) return;
+    if (is_black(total<kLobes>(value))) return;
     if (!split) weight = light.delta ? 1.0f : power_heuristic(light.density, value.density * scatter_share);
     if constexpr (kSplits<Visitor>) weight *= share;
     Rgb arriving = light.radiance * (weight / light.density);
     if (light.cast_shadow) {
-      const Ray ray = shadow_ray(point, light);
-      counts_.shadow++;
-      visitor.traced(ray, true);
       if constexpr (kStraight) {
+        const Ray ray = shadow_ray(point, light);
+        counts_.shadow++;
+        visitor.traced(ray, true);
         arriving *= transmittance(walk_, ray, path.context, counts_);
         if (is_black(arriving)) return;
       } else {
-        if (scene_.rays.occluded(ray)) return;
+        if (shadowed(point, light, visitor)) return;
       }
     }
     visitor.lit(path, value, arriving);
   }
 
-  static Vec3 light_normal(const SurfacePoint& point, const Surface& surface) {
+  static Vec3 light_normal(const SurfacePoint& point, [[maybe_unused]] const Surface& surface) {
     if constexpr (kLobes) {
       if (surface.effects & kTransmission) return Vec3(0.0f);
     }
     return point.normal;
   }
 
+  /// All bounces are diffuse, and this is the depth-th.
+  bool scatter_lambert(PathState& path, const SurfacePoint& point, const LambertSurface& surface, uint32_t depth,
+                       const Vec2& u) const {
+    Vec3 direction;
+    if (!sample_lambert(surface.normal, point.face_normal, u, direction, path.density)) return false;
+    path.throughput *= surface.material.albedo * path.density / path.density;
+    if (is_black(path.throughput)) return false;
+    leave(path, point, direction);
+    path.light_normal = point.normal;
+    path.context.kind = PathContext::kReflection | PathContext::kDiffuse;
+    path.context.depth = path.context.diffuse_depth = uint16_t(depth);
+    path.ray.mask = kVisibleDiffuse;
+    return true;
+  }
+
+  static void leave(PathState& path, const SurfacePoint& point, const Vec3& direction) {
+    path.position = point.position;
+    path.ray.origin = offset_origin(point, direction);
+    path.ray.direction = direction;
+    path.ray.t_min = 0.0f;
+    path.ray.t_max = kInfinity;
+  }
+
   template <class Visitor>
   bool scatter(PathState& path, const SurfacePoint& point, const Surface& surface, float share, float u_lobe,
                const Vec2& u, Visitor& visitor) const {
+    if constexpr (!kStraight) share = 1.0f;
     const BsdfSample s = sample<!kLobes>(surface, point.face_normal, point.outgoing, u_lobe, u);
     if constexpr (kCarries<Visitor>) visitor.turned(s);
     if (!s.valid || !(s.value.density > 0.0f)) return false;
     visitor.scattered(path, s);
-    path.throughput *= s.value.total() / (s.value.density * share);
-    if constexpr (kCarries<Visitor>) path.throughput = visitor.carried(s.value.total() / (s.value.density * share));
+    const Rgb factor = total<kLobes>(s.value) / (s.value.density * share);
+    path.throughput *= factor;
+    if constexpr (kCarries<Visitor>) path.throughput = visitor.carried(factor);
     if (is_black(path.throughput)) return false;
-    path.density = s.delta ? 0.0f : s.value.density * share;
-    path.position = point.position;
+    path.density = kLobes && s.delta ? 0.0f : s.value.density * share;
+    leave(path, point, s.direction);
     path.light_normal = light_normal(point, surface);
-    path.ray.origin = offset_origin(point, s.direction);
-    path.ray.direction = s.direction;
-    path.ray.t_min = 0.0f;
-    path.ray.t_max = kInfinity;
     path.last = count_bounce(path.context, walk_.limits, s.pass, s.transmitted, s.delta);
     path.ray.mask = visibility_of(path.context.kind);
     return true;
@@ -351,6 +480,11 @@ class Walker {
   const WalkScene& walk_;
   const CommittedScene& scene_;
   RayCounts& counts_;
+  const uint32_t most_diffuse_ = std::min(walk_.limits.max_bounces, walk_.limits.diffuse);
+  const LoneLight* const lone_ = scene_.lights.lone();
+  const bool has_world_ = scene_.materials.has_world();
+  const bool all_plain_ = scene_.materials.all_plain();
+  const bool some_read_uv_ = !walk_.with_uv && scene_.materials.some_read_uv();
 };
 
 }  // namespace afterglow

@@ -103,7 +103,13 @@ int main(int count, char** arguments) {
   request.width = request.height = uint16_t(kSize);
   request.count = kSamples;
   if (!std::strcmp(wanted, "bare")) {
-    const bare::Input input{scene, camera, film, kBounces, kSeed};
+    const LoneLight* lamp = scene.lights.lone();
+    if (!lamp) return 1;
+    bare::Input input{scene, camera, film, lamp->patch, lamp->radiance, {}, {}, kBounces, kSeed};
+    for (uint32_t m = 0; m < scene.scene.material_handles().size(); ++m) {
+      input.albedo.push_back(scene.materials.plain(m).albedo);
+      input.emission.push_back(scene.materials.plain(m).emission);
+    }
     measured([&] { bare::render(input, request, counts); });
     return report(film, counts);
   }

@@ -13,15 +13,16 @@ namespace afterglow::path_tracing {
 /// 32-bit floats, and no light that means something is near. What is above is dropped and counted.
 inline constexpr float kMostLight = 1e30f;
 
-template <bool kPasses>
+template <bool kPasses, bool kLobes = true>
 class FilmVisitor {
  public:
+  static constexpr bool kIgnoresSurfaces = !kPasses;
   FilmVisitor(const KernelInput& in, RayCounts& counts) : in_(in), layout_(in.film.layout()), counts_(counts) {}
 
   const float* sums() const { return sums_; }
   void begin_pixel() { std::memset(sums_, 0, sizeof(float) * size_t(layout_.floats)); }
   void begin_sample(const PathState& path, uint32_t index) {
-    index_ = index;
+    batch_ = sums_ + layout_[Pass::kBatches] + int(batch_of(index));
     light_ = Rgb(0.0f);
     transparent_ = 0.0f;
     if constexpr (kPasses) {
@@ -34,7 +35,7 @@ class FilmVisitor {
     float* combined = sums_ + layout_[Pass::kCombined];
     for (int c = 0; c < 3; ++c) combined[c] += light_[c];
     combined[3] += transparent_;
-    sums_[layout_[Pass::kBatches] + int(batch_of(index_))] += luminance(light_);
+    *batch_ += luminance(light_);
   }
 
   /// Depth, position and indexes are those in the middle of the pixel, as in Cycles: a walk before the first sample, of
@@ -69,10 +70,10 @@ class FilmVisitor {
   void lit(const PathState& path, const BsdfValue& value, const Rgb& light) {
     const bool direct = path.context.depth == 0;
     const Rgb arriving = path.throughput * light;
-    const Rgb c = kept(arriving * value.total(), direct);
-    if (is_black(c)) return;
+    const Rgb c = kept(arriving * total<kLobes>(value), direct);
     light_ += c;
     if constexpr (kPasses) {
+      if (is_black(c)) return;
       if (direct) {
         const Rgb share = c / glm::max(arriving * value.total(), Rgb(1e-38f));
         add(Pass::kDiffuseDirect, arriving * value.diffuse * share);
@@ -133,6 +134,7 @@ class FilmVisitor {
   /// Clamped, within bounds and not negative; what is dropped is counted.
   Rgb kept(const Rgb& light, bool direct) {
     const float sum = std::fabs(light.x) + std::fabs(light.y) + std::fabs(light.z);
+    if (sum <= least_limit_) return glm::max(light, Rgb(0.0f));
     if (!(sum <= kMostLight)) {
       counts_.dropped++;
       return Rgb(0.0f);
@@ -176,7 +178,8 @@ class FilmVisitor {
   const KernelInput& in_;
   const FilmLayout& layout_;
   RayCounts& counts_;
-  uint32_t index_ = 0;
+  const float least_limit_ = std::fmin(kMostLight, std::fmin(in_.clamp_indirect, in_.clamp_direct));
+  float* batch_ = nullptr;
   Rgb light_{0.0f};
   float transparent_ = 0.0f;
   Vec3 eye_{0.0f};
@@ -190,8 +193,8 @@ class FilmVisitor {
 };
 
 /// True: this is the surface that the pixel's middle shows.
-template <bool kPasses>
-bool FilmVisitor<kPasses>::place(const SurfacePoint& point, const Surface& surface) {
+template <bool kPasses, bool kLobes>
+bool FilmVisitor<kPasses, kLobes>::place(const SurfacePoint& point, const Surface& surface) {
   if (!covers(surface)) return false;
   const Scene& scene = in_.walk.scene.scene;
   const Handle material = scene.material_handles()[point.material];
@@ -204,8 +207,9 @@ bool FilmVisitor<kPasses>::place(const SurfacePoint& point, const Surface& surfa
 
 /// Data passes of the first surface that is more opaque than not, colours and mist of all up to there, weighted by what
 /// shows through.
-template <bool kPasses>
-void FilmVisitor<kPasses>::write_surface(const PathState& path, const SurfacePoint& point, const Surface& surface) {
+template <bool kPasses, bool kLobes>
+void FilmVisitor<kPasses, kLobes>::write_surface(const PathState& path, const SurfacePoint& point,
+                                                 const Surface& surface) {
   const Rgb alpha = Rgb(1.0f) - surface.transparency;
   if (!surface_known_ && covers(surface)) {
     surface_known_ = true;
@@ -231,8 +235,9 @@ void FilmVisitor<kPasses>::write_surface(const PathState& path, const SurfacePoi
 
 /// Albedo and normal for the denoiser: of the first surface of which less than three quarters are a mirror or clear
 /// glass, each lobe counted by the light that it sends on.
-template <bool kPasses>
-void FilmVisitor<kPasses>::write_features(const PathState& path, const SurfacePoint& point, const Surface& surface) {
+template <bool kPasses, bool kLobes>
+void FilmVisitor<kPasses, kLobes>::write_features(const PathState& path, const SurfacePoint& point,
+                                                  const Surface& surface) {
   if (layout_[Pass::kAlbedo] < 0 && layout_[Pass::kDenoiseNormal] < 0) return;
   constexpr float kSharp = 0.075f * 0.075f;
   float sharp = 0.0f, all = 0.0f;

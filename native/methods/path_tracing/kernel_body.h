@@ -9,12 +9,28 @@ namespace afterglow::path_tracing {
 
 inline float mean_length(const Vec3& a, const Vec3& b) { return 0.5f * (glm::length(a) + glm::length(b)); }
 
+/// A path from the camera. pinhole: the ray alone is wanted, and the camera has no lens.
+inline PathState path_from(const CameraRays& camera, const Vec2& on_film, const Vec2& on_lens, bool pinhole) {
+  if (pinhole) {
+    PathState path;
+    camera.pinhole_ray(on_film, path.ray);
+    return path;
+  }
+  const CameraRay from = camera.ray(on_film, on_lens);
+  PathState path;
+  path.ray = from.ray;
+  path.context.footprint = mean_length(from.origin_dx, from.origin_dy);
+  path.pixel_angle = mean_length(from.direction_dx, from.direction_dy);
+  return path;
+}
+
 template <uint32_t kFeatures>
 void render_request(const KernelInput& in, const PixelRequest& request, RayCounts& counts) {
   constexpr bool kPasses = kFeatures & kFeaturePasses;
   const Walker<kFeatures & 7u> walker(in.walk, counts);
-  const bool lens = in.camera.needs_lens();
-  FilmVisitor<kPasses> visitor(in, counts);
+  // No material that reads its point, no need of a footprint.
+  const bool pinhole = in.camera.is_pinhole() && in.walk.scene.materials.all_plain();
+  FilmVisitor<kPasses, bool(kFeatures & kFeatureLobes)> visitor(in, counts);
   for (uint32_t y = request.y; y < uint32_t(request.y) + request.height; y += request.step)
     for (uint32_t x = request.x; x < uint32_t(request.x) + request.width; x += request.step) {
       if (in.stop.stop()) return;
@@ -26,15 +42,11 @@ void render_request(const KernelInput& in, const PixelRequest& request, RayCount
       bool placing = kPasses && request.first == 0 && visitor.wants_place();  // one walk more, before the first sample
       for (uint32_t i = request.first; i < request.first + request.count;) {
         Sampler sampler(hash(pixel_seed, batch_of(i)), index_in_batch(i));
-        const Vec2 in_pixel = in.film.filter().offset(sampler.next2());
-        const Vec2 on_lens = lens ? sampler.next2() : Vec2(0.5f);
+        const auto [u_x, u_y, u_lens_x, u_lens_y] = sampler.block(0);
+        const Vec2 in_pixel = in.film.filter().offset({u_x, u_y});
+        const Vec2 on_lens(u_lens_x, u_lens_y);
         const Vec2 middle(float(x) + 0.5f, float(y) + 0.5f);
-        const CameraRay camera_ray = in.camera.ray(placing ? middle : middle + in_pixel, on_lens);
-        PathState path;
-        path.ray = camera_ray.ray;
-        path.ray.mask = kVisibleCamera;
-        path.context.footprint = mean_length(camera_ray.origin_dx, camera_ray.origin_dy);
-        path.pixel_angle = mean_length(camera_ray.direction_dx, camera_ray.direction_dy);
+        PathState path = path_from(in.camera, placing ? middle : middle + in_pixel, on_lens, pinhole);
         placing ? visitor.begin_place(path) : visitor.begin_sample(path, i);
         walker.walk(path, sampler, visitor);
         placing ? visitor.end_place() : visitor.end_sample();
