@@ -9,7 +9,7 @@ from typing import Any
 import afterglow
 import numpy as np
 import pytest
-from afterglow.scenes import Camera, Description, Light, look_at, node, translate
+from afterglow.scenes import Camera, Description, Light, look_at, make, node, translate
 from afterglow.scenes.native import Built
 from afterglow.scenes.rooms import background, diffuse, emission, furnace
 from afterglow.scenes.shapes import quad, sphere
@@ -328,6 +328,27 @@ def test_threads_do_not_change_a_bit(scene: str) -> None:
     one, two = (render(scene, size=24, samples=8, threads=n, passes=passes) for n in (1, 2))
     for name in one.passes:
         np.testing.assert_array_equal(one.passes[name], two.passes[name])
+
+
+@pytest.mark.parametrize("scene", ["cornell_emissive", "cornell_box", "world_furnace"])
+@pytest.mark.parametrize("change", ["passes", "material"])
+def test_what_a_kernel_leaves_out_does_not_change_the_picture(scene: str, change: str) -> None:
+    """Constant Lambert materials have a walk of their own; another pass, or a material that reads its point and that nothing
+    wears, brings the general one. Rounding may send a path elsewhere, but hardly ever."""
+    plain, other = make(scene), make(scene)
+    if change == "material":
+        other.materials["unused"] = diffuse(node("texture_coordinate").out("generated"))
+    a = render(plain, samples=16, size=32).image
+    b = render(other, samples=16, size=32, passes=["emission"] if change == "passes" else []).image
+    assert np.isclose(a, b, rtol=1e-4, atol=1e-6).mean() > 0.99
+
+
+def test_a_lone_light_is_one_of_two() -> None:
+    """With another light that hardly shines, behind a wall, nothing is lone, and lights are chosen: the mean is the same."""
+    other = make("cornell_emissive")
+    other.materials["faint"] = emission(1e-3)
+    other.add("Faint", quad((-1, 3, 0), (1, 3, 0), (1, 3, 2), (-1, 3, 2)), "faint")
+    agree(mean("cornell_emissive", repeats=6, size=32), mean(other, repeats=6, size=32))
 
 
 def test_seeds_differ_and_repeat() -> None:
