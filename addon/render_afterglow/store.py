@@ -9,6 +9,7 @@ Statistics and the last good image of each layer stay until another file is open
 
 from __future__ import annotations
 
+import weakref
 from typing import Any
 
 import bpy
@@ -21,6 +22,8 @@ from . import backend
 _kept: dict[tuple[str, str], Any] = {}
 # (scene's name, layer's name) → native scenes of viewports that were closed, for the next one that opens
 _resting: dict[tuple[str, str], list[Any]] = {}
+# viewports that render now
+_live: weakref.WeakSet[Any] = weakref.WeakSet()
 # scene's name → layer's name → statistics of the last render
 _statistics: dict[str, dict[str, dict[str, Any]]] = {}
 # (scene's name, layer's name) → pass name → pixels of the last image that was rendered without an error
@@ -57,6 +60,16 @@ def leave_resting(key: tuple[str, str], native: Any) -> None:
     """Keeps a closed viewport's native scene. One a layer: they are as large as the scene."""
     native.rest()
     _resting[key] = [native]
+
+
+def add_live(view: Any) -> None:
+    """A viewport renders from now on, until its object is gone or has no session."""
+    _live.add(view)
+
+
+def live_views(scene: bpy.types.Scene) -> list[Any]:
+    """The scene's viewports that render now."""
+    return [view for view in _live if view.session is not None and view.key[0] == scene_key(scene)]
 
 
 def view_key(depsgraph: bpy.types.Depsgraph) -> tuple[str, str]:

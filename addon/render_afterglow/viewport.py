@@ -11,6 +11,7 @@ import threading
 import time
 import traceback
 import weakref
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -200,6 +201,7 @@ class Viewport:
         self.session = backend.afterglow.Session(self.native.scene, self.settings)
         self.session.start()
         self.watcher.watch(self.session)
+        store.add_live(self)
 
     def _wanted(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> tuple[CameraView, dict[str, Any]]:
         """The view and the session's settings, as they are now in Blender."""
@@ -256,6 +258,27 @@ class Viewport:
             else:
                 self.session.resume()
                 self.watcher.wake()
+
+    # What the method remembers ----------------------------------------------------------------------------------------
+
+    def save_cache(self, path: str) -> None:
+        self._at_rest(lambda: self.session.save_cache(path))
+
+    def load_cache(self, path: str) -> None:
+        self._at_rest(lambda: self.session.load_cache(path))
+
+    def forget_cache(self) -> None:
+        self._at_rest(self.session.forget_cache)
+
+    def _at_rest(self, action: Callable[[], None]) -> None:
+        """Does something while nothing renders, then starts anew."""
+        self._expect()
+        self.session.cancel()
+        try:
+            action()
+        finally:
+            self.session.start()
+            self.watcher.wake()
 
     # Drawing --------------------------------------------------------------------------------------------------------
 

@@ -62,7 +62,7 @@ struct Answer {
   Rgb light{0.0f};
   float weight = 0.0f;
   float relative_error = 0.0f;
-};  // weight 0: a hole
+};  // weight 0: a hole; 2: a colour of a debug view, shown as it is. gather() may keep what stands there already
 
 struct Work {
   StopToken stop;

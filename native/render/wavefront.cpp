@@ -189,6 +189,25 @@ void join(const FilmLayout& layout, const WalkSettings& settings, const Question
   add(Pass::kTransmissionIndirect, light * q.transmission);
 }
 
+bool shown_as_it_is(const Answer& answer) { return answer.weight > 1.5f; }
+
+/// A debug view's colours take the place of the request's picture.
+bool show_colours(const FilmLayout& layout, const Wavefront& wave, size_t request, WalkedRequest& r) {
+  const size_t first = wave.first[request], floats = size_t(layout.floats);
+  const auto begin = wave.answers.begin() + ptrdiff_t(first);
+  if (std::none_of(begin, begin + ptrdiff_t(r.questions.size()), shown_as_it_is)) return false;
+  const int at = layout[Pass::kCombined];
+  for (size_t pixel = 0; pixel * floats < r.sums.size(); ++pixel)
+    std::fill_n(r.sums.begin() + ptrdiff_t(pixel * floats) + at, 3, 0.0f);
+  for (size_t k = 0; k < r.questions.size(); ++k) {
+    const CachePoint& p = wave.points[first + k];
+    if (p.layer || p.translucent || !shown_as_it_is(wave.answers[first + k])) continue;
+    for (int c = 0; c < 3; ++c)
+      r.sums[floats * r.questions[k].pixel + size_t(at + c)] += wave.answers[first + k].light[c];
+  }
+  return true;
+}
+
 void finish(std::span<const PixelRequest> requests, Film& film, Wavefront& wave, const WalkSettings& settings,
             Work& work, WavefrontTimes& times) {
   const Stopwatch watch(times.film);
@@ -198,7 +217,8 @@ void finish(std::span<const PixelRequest> requests, Film& film, Wavefront& wave,
     for (size_t i = begin; i < end; ++i) {
       WalkedRequest& r = wave.requests[i];
       uint64_t lost = 0;
-      for (size_t k = 0; k < r.questions.size(); ++k)
+      const bool shown = show_colours(film.layout(), wave, i, r);
+      for (size_t k = 0; k < r.questions.size() && !shown; ++k)
         join(film.layout(), settings, r.questions[k], wave.answers[wave.first[i] + k],
              r.sums.data() + floats * r.questions[k].pixel, lost);
       dropped += lost;

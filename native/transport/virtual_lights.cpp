@@ -12,7 +12,8 @@ namespace afterglow {
 namespace {
 
 constexpr uint32_t kStartDimensions = 8, kBounceDimensions = 8;
-constexpr int kMostPassages = 64;  // mirrors, glass and transparent surfaces between two diffuse ones
+constexpr uint32_t kBeginnings = 4;  // of a path, one of which is gone on with
+constexpr int kMostPassages = 64;    // mirrors, glass and transparent surfaces between two diffuse ones
 
 /// What a surface does to light paths: diffuse lobes reflect and transmit, the others lead on.
 struct Shares {
@@ -35,11 +36,43 @@ class LightPath {
   LightPath(const WalkScene& walk, const LightEmission& emission, const SlotPlan& plan, RayCounts& counts)
       : walk_(walk), emission_(emission), plan_(plan), counts_(counts) {}
 
+  /// Most rays of a sky miss a room with a window: of several beginnings the first that meets a surface is taken, with
+  /// the strength of their share that does. Which one that is depends on nothing but who meets something, so the mean
+  /// stays.
   void trace(uint32_t path, uint32_t seed, std::vector<VirtualLight>& out) {
-    Sampler sampler(seed, path);
+    uint32_t alive = 0;
+    VirtualLight first;
+    LightPath chosen = *this;
+    bool goes_on = false;
+    uint32_t index = path;
+    for (uint32_t candidate = 0; candidate < kBeginnings; ++candidate) {
+      const uint32_t at = path + candidate * plan_.paths[0];
+      VirtualLight light;
+      const bool more = begin(at, seed, light);
+      if (!light.alive || alive++ > 0) continue;
+      first = light, goes_on = more, index = at;
+      chosen.take(*this);
+    }
+    if (!alive) return;
+    const float share = float(alive) / float(kBeginnings);
+    first.front *= share, first.back *= share;
+    out[plan_.first[0] + path] = first;
+    take(chosen);
+    throughput_ *= share;
+    Sampler sampler(seed, index);
+    for (uint32_t bounce = 1; goes_on && bounce < plan_.paths.size() && path < plan_.paths[bounce]; ++bounce) {
+      sampler.set_dimension(kStartDimensions + kBounceDimensions * bounce);
+      goes_on = next_light(sampler, 1.0f / float(plan_.paths[bounce]), out[plan_.first[bounce] + path]);
+    }
+  }
+
+ private:
+  /// From the emitter to the first diffuse surface. False: the path ends there.
+  bool begin(uint32_t index, uint32_t seed, VirtualLight& light) {
+    Sampler sampler(seed, index);
     const float u_choice = sampler.next1();
     const Vec2 place = sampler.next2(), way = sampler.next2();
-    if (!emission_.sample(u_choice, place, way, from_)) return;
+    if (!emission_.sample(u_choice, place, way, from_)) return false;
     ray_ = from_.ray;
     first_ = true;
     context_ = PathContext{};
@@ -47,13 +80,16 @@ class LightPath {
     context_.drop_glossy = !walk_.limits.caustics_reflective;
     context_.drop_refractive = !walk_.limits.caustics_refractive;
     throughput_ = Rgb(1.0f);
-    for (uint32_t bounce = 0; bounce < plan_.paths.size() && path < plan_.paths[bounce]; ++bounce) {
-      sampler.set_dimension(kStartDimensions + kBounceDimensions * bounce);
-      if (!next_light(sampler, 1.0f / float(plan_.paths[bounce]), out[plan_.first[bounce] + path])) return;
-    }
+    sampler.set_dimension(kStartDimensions);
+    return next_light(sampler, 1.0f / float(plan_.paths[0]), light);
   }
 
- private:
+  /// Stands where another path stands.
+  void take(const LightPath& other) {
+    from_ = other.from_, ray_ = other.ray_, context_ = other.context_;
+    throughput_ = other.throughput_, first_ = other.first_;
+  }
+
   /// Goes on to the next surface with a diffuse lobe and leaves a light there. False: the path ended.
   bool next_light(Sampler& sampler, float share, VirtualLight& light) {
     const float u_lobe = sampler.next1(), u_straight = sampler.next1();

@@ -89,6 +89,7 @@ def render(job: dict, folder: str, number: int) -> dict:
                     "caustics_reflective": False, "caustics_refractive": False, **settings}
     engine = job.get("engine", "AFTERGLOW")
     apply(scene, engine, settings)
+    scene.render.use_persistent_data = bool(job.get("persistent"))
     layer = bpy.context.view_layer
     for name in LIGHT_PASSES:
         if hasattr(layer, "use_pass_" + name):

@@ -50,7 +50,7 @@ def test_the_viewport_keeps_its_cache_over_switches_and_edits(in_window: Run, bl
         """,
         blend_files / "cornell_box.blend",
     )
-    first, moved, brighter, back, fresh = found["seen"]
+    first, moved, brighter, back, _fresh = found["seen"]
     assert first["method"] == "INSTANT_CACHE"
     assert [it["resets"] for it in found["seen"]] == [1, 1, 1, 1, 1]
     assert moved["objects_moved"] == 1 and moved["records_moved"] > 10

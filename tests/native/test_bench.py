@@ -195,3 +195,30 @@ def test_a_divided_pass_is_judged_where_its_noise_allows() -> None:
     assert compare({"combined": theirs["combined"], "Diffuse Direct" + DIVIDED: values(1.03, 1e-4)}, theirs)[0] > 1
     worst, _, details = compare({"combined": theirs["combined"], "Diffuse Direct" + DIVIDED: values(1.5, 0.3)}, theirs)
     assert worst < 1e-3 and resolved(details) and details["Diffuse Direct" + DIVIDED]["resolved"] > 1
+
+
+def test_the_instant_cache_has_a_figure_for_every_row_of_its_table() -> None:
+    assert set(bench.SETS["instant_cache"]) == {"first_frame", "animation", "whole_frame", "difference", "after_edits", "error",
+                                                "viewport", "flicker", "scaling"}
+
+
+def test_a_view_rests_when_its_last_far_picture_has_gone() -> None:
+    from afterglow.bench.foundation.viewport import Watched
+    from afterglow.bench.instant_cache.viewport import rests_after
+
+    pictures = [np.full((4, 4, 3), value, np.float32) for value in (0.0, 0.4, 0.502, 0.49, 0.501, 0.5)]
+    assert rests_after(Watched([0.0, 0.1, 0.3, 0.6, 0.9, 2.0], pictures)) == 0.6
+
+
+def test_stages_of_a_cached_animation_are_told_apart() -> None:
+    from afterglow import scenes
+    from afterglow.bench.instant_cache.watched import METHODS, Watched
+
+    live = {kind: Watched(lambda: scenes.make("cornell_box"), method, width=60, height=40) for kind, method in METHODS.items()}
+    frames = {kind: watched.frame() for kind, watched in live.items()}
+    assert frames["IGI"].filter > 0 and frames["IC"].filter == 0 and frames["IC"].fill > 0
+    live["TIC"].move_to(1.0)
+    assert live["TIC"].frame().fill < 0.5 * frames["TIC"].fill
+    records = live["IC"].values()["records"]
+    live["IC"].move_to(1.0, anew=True)
+    assert live["IC"].values()["resets"] == 1 and live["IC"].values()["records"] == records

@@ -291,3 +291,51 @@ def test_any_size_of_scene_shows_the_same(size: float) -> None:
     one = render(scaled(1.0), **settings).passes["diffuse_indirect"]
     other = render(scaled(size), **settings).passes["diffuse_indirect"]
     assert abs(other.mean() / one.mean() - 1) < 0.03
+
+
+def test_a_scene_that_grows_keeps_its_records() -> None:
+    """The ball around the scene, which suns and the bound go by, is another one then."""
+    live = Live(room(), width=32, height=32)
+    before = live.numbers()
+    for where in ((0.4, -30.0, 0.9), (0.4, -0.3, 0.9)):
+        after = live.edit(lambda where=where: live.move("Ball", translate(where)))
+        assert after["resets"] == 1 and after["records"] >= before["records"] and after["verified_differing"] == 0
+        assert after["verified_records"] >= 0.9 * before["records"]
+
+
+def test_a_material_that_turns_clear_and_back_keeps_the_records() -> None:
+    live = Live(room(), width=32, height=32)
+    ball = live.built.materials["ball"]
+    before = live.image()
+    for material in (node("transparent_bsdf", color=(0.9, 0.5, 0.2)), diffuse((0.3, 0.5, 0.7))):
+        after = live.edit(lambda material=material: live.scene.set_material(ball, graph(material)))
+        assert after["resets"] == 1 and after["verified_differing"] == 0
+        assert after["update_rays"] < 0.7 * after["fill_rays"]
+    assert np.abs(live.image() - before).mean() < 0.02 * before[..., :3].mean()
+
+
+def test_views_show_what_the_cache_holds() -> None:
+    live = Live(room(), width=48, height=48, cache_view="CHANGES")
+    new = live.image()[..., :3]
+    live.edit(lambda: live.move("Ball", translate((0.45, -0.3, 0.9))))
+    changed = live.image()[..., :3]
+    live.session.update({"seed": 1})
+    live.session.wait()
+    reused = live.image()[..., :3]
+    seen = new.max(-1) > 0  # the rest is outside of the room
+
+    def share(image: np.ndarray, channel: int) -> float:
+        lit = seen & (image.max(-1) > 0)
+        return float((image[lit].argmax(-1) == channel).mean())
+
+    assert share(new, 1) > 0.99
+    assert 0.02 < share(changed, 0) and share(changed, 1) < 0.3
+    assert share(reused, 2) > 0.8 and share(reused, 0) == 0
+    for view in ("RECORDS", "RAYS", "LIGHTS", "LIGHT"):
+        live.session.update({"cache_view": view})
+        live.session.wait()
+        light = live.image()[..., :3]
+        assert np.isfinite(light).all() and light.max() > 0.1 and live.numbers()["resets"] == 1
+    with pytest.raises(afterglow.InvalidInput, match="cache_view"):
+        live.session.update({"cache_view": "NOTHING"})
+        live.session.wait()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Saved instant caches: the same image after a reload, repaired where lights changed meanwhile, refused where it is not theirs."""
+"""Saved instant caches: the same image after a reload, repaired where lights changed meanwhile, refused for other scenes."""
 
 from __future__ import annotations
 

@@ -3,9 +3,9 @@
 
 import bpy
 
-from . import accuracy, information, presets
+from . import accuracy, cache, information, presets
 
-_modules = (accuracy, information, presets)
+_modules = (accuracy, cache, information, presets)
 
 
 def register() -> None:

@@ -90,13 +90,25 @@ def own_settings(method: dict[str, Any], shared: set[str]) -> list[dict[str, Any
     return [setting for setting in method.get("settings", ()) if setting["name"] not in shared]
 
 
+def is_debug(name: str) -> bool:
+    """Whether a setting is there to look into a method, not to render."""
+    return name.endswith(("_view", "_verify"))
+
+
+def with_views(setting: dict[str, Any], method: dict[str, Any]) -> dict[str, Any]:
+    """The setting that chooses a debug view as a choice among those that the method names; others as they are."""
+    if not setting["name"].endswith("_view") or not method.get("debug_views"):
+        return setting
+    return {**setting, "type": "enum", "items": [setting["default"], *method["debug_views"]]}
+
+
 def build_groups(shared: set[str]) -> dict[str, type]:
     """One property group for every method that has settings of its own, by the name it gets in `scene.afterglow`."""
     for method in backend.method_descriptions():
         settings = own_settings(method, shared)
         name = group_name(method["id"])
         if settings and name not in _groups:
-            annotations = {setting["name"]: make_property(setting) for setting in settings}
+            annotations = {setting["name"]: make_property(with_views(setting, method)) for setting in settings}
             title = "AfterglowMethod" + method["id"].title().replace("_", "")
             _groups[name] = type(title, (bpy.types.PropertyGroup,), {"__annotations__": annotations})
     return _groups

@@ -189,7 +189,8 @@ def session_settings(scene: bpy.types.Scene, viewport: bool) -> dict[str, Any]:
     for name in methods._groups:
         if name.upper() == own.method or own.method == "AUTO":
             group = getattr(own, name)
-            settings.update({key: getattr(group, key) for key in group.__annotations__})
+            keys = [key for key in group.__annotations__ if viewport or not methods.is_debug(key)]
+            settings.update({key: getattr(group, key) for key in keys})  # final renders show light, always
     return settings
 
 

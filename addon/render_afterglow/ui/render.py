@@ -47,22 +47,54 @@ class AFTERGLOW_RENDER_PT_sampling_method(PropertiesPanel, bpy.types.Panel):
 
     def draw_header(self, context: bpy.types.Context) -> None:
         description = chosen_description(context.scene)
-        self.layout.label(text=description["label"] if description else "")
+        automatic = " (Viewport)" if context.scene.afterglow.method == "AUTO" else ""
+        self.layout.label(text=description["label"] + automatic if description else "")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.prepare()
         group = chosen_group(context.scene)
         for name in group.__annotations__:
-            layout.prop(group, name)
+            if not methods.is_debug(name):
+                layout.prop(group, name)
+
+
+class AFTERGLOW_RENDER_PT_sampling_cache(PropertiesPanel, bpy.types.Panel):
+    bl_label = "Cache"
+    bl_parent_id = "AFTERGLOW_RENDER_PT_sampling"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine in cls.COMPAT_ENGINES and view_setting(context.scene) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.prepare()
+        layout.prop(*view_setting(context.scene), text="Viewport Shows")
+        row = layout.row(align=True)
+        row.operator("afterglow.cache_save", text="Save")
+        row.operator("afterglow.cache_load", text="Load")
+        row.operator("afterglow.cache_forget")
+
+
+def chosen_method(scene: bpy.types.Scene) -> str:
+    """The method whose settings matter; of the engine's own choice, the viewport's."""
+    return "INSTANT_CACHE" if scene.afterglow.method == "AUTO" else scene.afterglow.method
 
 
 def chosen_group(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
     """The chosen method's own settings, where it has some."""
-    return getattr(scene.afterglow, methods.group_name(scene.afterglow.method), None)
+    return getattr(scene.afterglow, methods.group_name(chosen_method(scene)), None)
+
+
+def view_setting(scene: bpy.types.Scene) -> tuple[bpy.types.PropertyGroup, str] | None:
+    """The setting of the chosen method that shows what its cache holds."""
+    group = chosen_group(scene)
+    names = [name for name in group.__annotations__ if name.endswith("_view")] if group is not None else []
+    return (group, names[0]) if names else None
 
 
 def chosen_description(scene: bpy.types.Scene) -> dict | None:
-    return next((m for m in backend.method_descriptions() if m["id"] == scene.afterglow.method), None)
+    return next((m for m in backend.method_descriptions() if m["id"] == chosen_method(scene)), None)
 
 
 class AFTERGLOW_RENDER_PT_sampling_render(PropertiesPanel, bpy.types.Panel):
@@ -251,6 +283,7 @@ classes = (
     AFTERGLOW_PT_sampling_presets,
     AFTERGLOW_RENDER_PT_sampling,
     AFTERGLOW_RENDER_PT_sampling_method,
+    AFTERGLOW_RENDER_PT_sampling_cache,
     AFTERGLOW_RENDER_PT_sampling_render,
     AFTERGLOW_RENDER_PT_sampling_viewport,
     AFTERGLOW_RENDER_PT_denoise,

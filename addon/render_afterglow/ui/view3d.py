@@ -4,6 +4,23 @@
 import bpy
 
 from .panel import ENGINES
+from .render import view_setting
+
+
+class AFTERGLOW_VIEW3D_PT_shading_cache(bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "HEADER"
+    bl_label = "Cache"
+    bl_parent_id = "VIEW3D_PT_shading"
+    COMPAT_ENGINES = ENGINES
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        rendered = context.engine in cls.COMPAT_ENGINES and context.space_data.shading.type == "RENDERED"
+        return rendered and view_setting(context.scene) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.prop(*view_setting(context.scene), text="Show")
 
 
 class AFTERGLOW_VIEW3D_PT_shading_lighting(bpy.types.Panel):
@@ -36,4 +53,4 @@ def draw_pause(self: bpy.types.Header, context: bpy.types.Context) -> None:
         self.layout.prop(context.scene.afterglow, "preview_pause", icon="PLAY" if paused else "PAUSE", text="")
 
 
-classes = (AFTERGLOW_VIEW3D_PT_shading_lighting,)
+classes = (AFTERGLOW_VIEW3D_PT_shading_lighting, AFTERGLOW_VIEW3D_PT_shading_cache)

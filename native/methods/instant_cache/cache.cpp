@@ -13,7 +13,8 @@ namespace afterglow::instant_cache {
 
 namespace {
 
-constexpr size_t kRecordBlock = 4;  // 1024 rays or so
+constexpr float kSameLight = 0.02f;  // relative change of a record's light that leaves its radius as it is
+constexpr size_t kRecordBlock = 4;   // 1024 rays or so
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -32,7 +33,7 @@ Answer Cache::answer(const CachePoint& p) const {
   float weights = 0.0f;
   Rgb sum(0.0f);
   bool waits = false;
-  octree_.find(p.position, [&](const Entry& e) {
+  octree_.find(p.position, 1.0f / limit, [&](const Entry& e) {
     const float distance = distance_to_record(e, p, limit, spacing_.angle_scale);
     if (distance >= 1.0f) return true;
     const Record& record = records_[e.record];
@@ -41,7 +42,7 @@ Answer Cache::answer(const CachePoint& p) const {
       waits = true;
       return true;
     }
-    std::atomic_ref(used_[e.record]).store(update_, std::memory_order_relaxed);
+    note_use(e.record);
     const float weight = record_weight(distance);
     weights += weight;
     sum += weight * record.irradiance;
@@ -53,10 +54,16 @@ Answer Cache::answer(const CachePoint& p) const {
   return result;
 }
 
-bool Cache::covered(const CachePoint& p) const {
+/// Writes only what is new: threads share the memory.
+void Cache::note_use(uint32_t record) const {
+  const std::atomic_ref used(used_[record]);
+  if (used.load(std::memory_order_relaxed) != update_) used.store(update_, std::memory_order_relaxed);
+}
+
+bool Cache::covered(const Octree& octree, const CachePoint& p) const {
   const float limit = spacing_.most_pixels * p.footprint;
   bool found = false;
-  octree_.find(p.position, [&](const Entry& e) {
+  octree.find(p.position, 1.0f / limit, [&](const Entry& e) {
     found = distance_to_record(e, p, limit, spacing_.angle_scale) < 1.0f;
     return !found;
   });
@@ -70,8 +77,8 @@ bool Cache::insert(const CommittedScene& scene, const CachePoint& p) {
   if (!locate(scene.scene, record)) return false;
   record.footprint = p.footprint;
   record.reach = record.radius = std::max(spacing_.most_pixels * p.footprint, 1e-6f * radius_);
-  record.used = update_;
-  octree_.insert(uint32_t(records_.size()), record);
+  record.born = record.asked = update_;
+  octree_.insert(uint32_t(records_.size()), record, record.reach);
   records_.push_back(record);
   used_.push_back(update_);
   wanted_.push_back(0);
@@ -82,13 +89,12 @@ bool Cache::insert(const CommittedScene& scene, const CachePoint& p) {
 
 void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points, Work& work) {
   const double begun = now();
-  if (settings_.on_demand) {
-    std::vector<uint32_t> wanted;
-    for (uint32_t i = 0; i < records_.size(); ++i)
-      if (wanted_[i]) wanted.push_back(i), wanted_[i] = 0;
-    counts_.updated += wanted.size();
-    counts_.update_rays += resolve(scene, wanted, work);
-  }
+  const uint32_t before = uint32_t(records_.size());
+  std::vector<uint32_t> wanted;
+  for (uint32_t i = 0; i < records_.size(); ++i)
+    if (wanted_[i]) wanted.push_back(i), wanted_[i] = 0;
+  counts_.updated += wanted.size();
+  counts_.update_rays += resolve(scene, wanted, work);
   std::vector<std::vector<uint32_t>> rounds(kRounds);
   for (uint32_t i = 0; i < points.size(); ++i) rounds[round_of(points[i])].push_back(i);
   // A record's radius is known when its light is, and may turn out smaller than it was taken for while records were
@@ -98,7 +104,7 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
     while (!work.stop.stop()) {
       open.assign(asked.size(), 0);
       parallel_blocks(asked.size(), 256, work.threads, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) open[i] = !covered(points[asked[i]]);
+        for (size_t i = begin; i < end; ++i) open[i] = !covered(octree_, points[asked[i]]);
       });
       size_t left = 0;
       for (size_t i = 0; i < asked.size(); ++i)
@@ -106,14 +112,19 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
       asked.resize(left);
       const uint32_t first = uint32_t(records_.size());
       for (const uint32_t i : asked)
-        if (!covered(points[i]) && !insert(scene, points[i])) counts_.refused++;
+        if (!covered(octree_, points[i]) && !insert(scene, points[i])) counts_.refused++;
       if (records_.size() == first) break;
       std::vector<uint32_t> fresh(records_.size() - first);
       for (uint32_t i = 0; i < fresh.size(); ++i) fresh[i] = first + i;
       counts_.fill_rays += resolve(scene, fresh, work);
     }
+  fresh_.clear(center_, radius_);
+  has_fresh_ = records_.size() > before;
+  for (uint32_t i = before; i < records_.size(); ++i) fresh_.insert(i - before, records_[i], records_[i].radius);
   counts_.seconds_fill += now() - begun;
 }
+
+bool Cache::answers_otherwise(const CachePoint& p) const { return has_fresh_ && covered(fresh_, p); }
 
 uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> which, Work& work) {
   std::atomic<uint64_t> rays{0};
@@ -124,7 +135,7 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
         RayCounts counts;
         std::vector<float> terms(lights_.padded());
         for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
-          ask(walked, which[i], terms.data(), counts);
+          ask(walked, which[i], terms.data(), counts);  // leaves the record's terms
           sum(which[i], terms.data());
         }
         rays += counts.shadow;
@@ -132,11 +143,13 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
       work.stop);
   for (const uint32_t i : which)
     if (records_[i].ready) octree_.set_radius(i, records_[i]);
+  counts_.rays_now += rays;
   return rays;
 }
 
 void Cache::ask(const WalkScene& walked, size_t index, float* terms, RayCounts& counts) {
-  const Record& record = records_[index];
+  Record& record = records_[index];
+  const uint64_t rays_before = counts.shadow;
   geometry_terms(lights_, record.position, record.normal, bound_, terms);
   const Vec3 from = record.position + record.error * record.face_normal;
   uint64_t* unknown = visibility_.unknown(index);
@@ -151,10 +164,12 @@ void Cache::ask(const WalkScene& walked, size_t index, float* terms, RayCounts& 
     }
     unknown[w] = 0;
   }
+  record.rays = uint32_t(counts.shadow - rays_before);
+  if (record.rays) record.asked = update_;
 }
 
-Rgb Cache::irradiance(size_t row, const Vec3& position, const Vec3& normal, float* terms) const {
-  geometry_terms(lights_, position, normal, bound_, terms);
+/// Terms: geometry_terms() of a place at or near the record's.
+Rgb Cache::irradiance(size_t row, const float* terms) const {
   const uint64_t* seen = visibility_.seen(row);
   Rgb sum(0.0f);
   for (uint32_t w = 0; w < visibility_.words(); ++w)
@@ -170,18 +185,22 @@ Rgb Cache::irradiance(size_t row, const Vec3& position, const Vec3& normal, floa
 
 void Cache::sum(size_t index, float* terms) {
   Record& record = records_[index];
-  record.irradiance = irradiance(index, record.position, record.normal, terms);
+  record.irradiance = irradiance(index, terms);
+  const float here = luminance(record.irradiance);
+  record.ready = true;
+  if (std::fabs(here - record.measured) <= kSameLight * record.measured) return;
+  record.measured = here;
   // How fast the light changes along the surface, shadows left aside: by two steps of a pixel or so.
-  const float step = 0.25f * record.reach, here = luminance(record.irradiance);
+  const float step = 0.25f * record.reach;
   const Frame frame(record.normal);
   float slope2 = 0.0f;
   for (const Vec3& way : {frame.t, frame.b}) {
-    const float there = luminance(irradiance(index, record.position + step * way, record.normal, terms));
+    geometry_terms(lights_, record.position + step * way, record.normal, bound_, terms);
+    const float there = luminance(irradiance(index, terms));
     const float slope = (there - here) / (step * std::max(0.5f * (there + here), 1e-30f));
     slope2 += slope * slope;
   }
   record.radius = std::min(record_radius(spacing_, std::sqrt(slope2), record.footprint), record.reach);
-  record.ready = true;
 }
 
 Verification Cache::verify(const CommittedScene& scene, Work& work) const {

@@ -25,6 +25,7 @@ struct CacheSettings {
 
 struct CacheCounts {
   uint64_t path_rays = 0, fill_rays = 0, update_rays = 0, pairs_marked = 0, pairs = 0;
+  uint64_t rays_now = 0;  // visibility rays since the last update began
   uint64_t created = 0, updated = 0, reused = 0, moved = 0, dropped = 0, resets = 0, refused = 0;
   uint32_t lights = 0, lights_moved = 0, lights_recoloured = 0, objects_moved = 0;
   double seconds_lights = 0.0, seconds_update = 0.0, seconds_fill = 0.0;
@@ -36,12 +37,21 @@ struct Verification {
   uint64_t records = 0, differing = 0;
 };
 
+/// What a picture shows: light, which record answers, what became of it, how many rays that took, virtual lights.
+enum class View : uint8_t { kLight, kRecords, kChanges, kRays, kLights };
+
+constexpr float kAsItIs = 2.0f;  // an answer's weight: no light, a colour that is shown as it is
+
 class Cache {
  public:
   void configure(const CacheSettings&);
   void update(const CommittedScene&, const SceneChanges&, Work&);
   void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
   Answer answer(const CachePoint&) const;
+  /// Whether a record that the last fill() made may have a say in what answer() gave before it.
+  bool answers_otherwise(const CachePoint&) const;
+  /// A debug view's colour in place of light.
+  Answer show(View, const CachePoint&) const;
   Verification verify(const CommittedScene&, Work&) const;
   const CacheCounts& counts() const { return counts_; }
   size_t size() const { return records_.size(); }
@@ -60,13 +70,17 @@ class Cache {
   void age();
   void keep(const std::vector<uint32_t>& kept);
   void rebuild_octree();
-  bool covered(const CachePoint&) const;
+  void note_use(uint32_t record) const;
+  /// Whether the record answered in the last frame or the one before: interrupted frames use few.
+  bool was_used(uint32_t record) const { return update_ - used_[record] <= 2; }
+  Rgb show_lights(const CachePoint&, float bounced) const;
+  bool covered(const Octree&, const CachePoint&) const;
   bool insert(const CommittedScene&, const CachePoint&);
   /// Asks what is unknown of these records and sums their light anew.
   uint64_t resolve(const CommittedScene&, std::span<const uint32_t> records, Work&);
   void ask(const WalkScene&, size_t record, float* terms, RayCounts&);
   void sum(size_t record, float* terms);
-  Rgb irradiance(size_t row, const Vec3& position, const Vec3& normal, float* terms) const;
+  Rgb irradiance(size_t row, const float* terms) const;
   WalkScene walk(const CommittedScene& scene) const {
     return {scene, settings_.walk.limits, shown_.empty() ? nullptr : &shown_, false};
   }
@@ -86,7 +100,8 @@ class Cache {
 
   std::vector<Record> records_;
   VisibilityTable visibility_;
-  Octree octree_;
+  Octree octree_, fresh_;  // all of them; those of the last fill()
+  bool has_fresh_ = false;
   mutable std::vector<uint32_t> used_;   // the update after which a record last answered
   mutable std::vector<uint8_t> wanted_;  // asked for while something of it was unknown
   uint32_t update_ = 0;

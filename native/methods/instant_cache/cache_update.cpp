@@ -70,28 +70,38 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   LightEmission::surrounding_ball(scene.scene.bounds(), center, radius);
   const float bound = settings_.lights.bound_length(scene.scene.bounds());
   const bool coloured = scene.effects.has(kTransparency) || !shown.empty();
-  stale_ |= changes.everything || changes.origin || shown != shown_ || center != center_ || radius != radius_ ||
-            bound != bound_ || coloured != visibility_.coloured();
+  stale_ |= changes.everything || changes.origin || shown != shown_;
+  // Another ball around the scene: all sums are made anew, and the lights whose paths begin on it move. Visibility
+  // stays.
+  const bool scaled = center != center_ || radius != radius_ || bound != bound_;
   shown_ = shown, center_ = center, radius_ = radius, bound_ = bound;
   update_++;
   const bool all = stale_;
-  if (all) reset(scene);
+  if (all) {
+    reset(scene);
+  } else {
+    if (coloured != visibility_.coloured()) visibility_.set_coloured(coloured);
+    if (scaled) rebuild_octree();
+  }
+  counts_.rays_now = 0;
   SceneChanges seen = changes;
   seen.camera = false;
   counts_.updated = counts_.reused = counts_.moved = counts_.created = 0;
-  const bool compares = std::exchange(loaded_, false);
+  const bool compares = std::exchange(loaded_, false) || scaled;
   if (!all && !compares && seen.empty()) {
     counts_.reused = records_.size();
     std::vector<uint32_t> waiting;  // an earlier update was interrupted
     for (uint32_t i = 0; i < records_.size(); ++i)
-      if (!records_[i].ready) waiting.push_back(i);
+      if (!records_[i].ready && was_used(i)) waiting.push_back(i);
     if (!settings_.on_demand) counts_.update_rays += resolve(scene, waiting, work);
+    has_fresh_ = false;
     return;
   }
   age();
   std::vector<uint64_t> moved_slots;
   bool recoloured = false;
   trace_lights(scene, work, moved_slots, recoloured);
+  recoloured |= scaled;
   const std::vector<Moved> moved = placement_.update(scene, changes);
   counts_.objects_moved = uint32_t(moved.size());
   follow(scene, moved);
@@ -108,7 +118,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
     counts_.pairs += lights_.count;
     if (any) {
       records_[i].ready = false;
-      waiting.push_back(i);
+      if (was_used(i)) waiting.push_back(i);  // the others wait until somebody wants them
     } else if (recoloured) {
       dimmed.push_back(i);
     } else {
@@ -116,10 +126,10 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
     }
   }
   resolve(scene, dimmed, work);  // sums alone
-  if (settings_.on_demand)
-    std::fill(wanted_.begin(), wanted_.end(), uint8_t(0));
-  else
+  std::fill(wanted_.begin(), wanted_.end(), uint8_t(0));
+  if (!settings_.on_demand)
     counts_.update_rays += resolve(scene, waiting, work), counts_.updated += waiting.size();
+  has_fresh_ = false;
   counts_.seconds_update += now() - begun;
 }
 
@@ -281,7 +291,7 @@ void Cache::keep(const std::vector<uint32_t>& kept) {
 
 void Cache::rebuild_octree() {
   octree_.clear(center_, radius_);
-  for (uint32_t i = 0; i < records_.size(); ++i) octree_.insert(i, records_[i]);
+  for (uint32_t i = 0; i < records_.size(); ++i) octree_.insert(i, records_[i], records_[i].radius);
 }
 
 }  // namespace afterglow::instant_cache

@@ -97,7 +97,8 @@ struct SavedLight {
 struct SavedRecord {
   uint32_t instance, triangle, back;
   float u, v, numbers[16];
-  uint32_t used, ready, wanted;
+  float measured;
+  uint32_t born, asked, rays, used, ready, wanted;
 };
 
 void put(float*& to, const Vec3& v) { *to++ = v.x, *to++ = v.y, *to++ = v.z; }
@@ -129,6 +130,7 @@ SavedRecord saved(const Record& r, uint32_t used, uint8_t wanted) {
   float* at = s.numbers;
   for (const Vec3* v : {&r.position, &r.normal, &r.face_normal, &r.irradiance}) put(at, *v);
   *at++ = r.error, *at++ = r.footprint, *at++ = r.reach, *at = r.radius;
+  s.measured = r.measured, s.born = r.born, s.asked = r.asked, s.rays = r.rays;
   s.used = used, s.ready = r.ready, s.wanted = wanted;
   return s;
 }
@@ -139,14 +141,15 @@ Record restored(const SavedRecord& s) {
   const float* at = s.numbers;
   for (Vec3* v : {&r.position, &r.normal, &r.face_normal, &r.irradiance}) *v = take(at);
   r.error = *at++, r.footprint = *at++, r.reach = *at++, r.radius = *at;
-  r.used = s.used, r.ready = s.ready != 0;
+  r.measured = s.measured, r.born = s.born, r.asked = s.asked, r.rays = s.rays;
+  r.ready = s.ready != 0;
   return r;
 }
 
 bool sound(const Scene& scene, const SavedRecord& s) {
   for (const float number : s.numbers)
     if (!std::isfinite(number)) return false;
-  if (s.instance >= scene.instances().size()) return false;
+  if (!std::isfinite(s.measured) || s.instance >= scene.instances().size()) return false;
   const Mesh* mesh = scene.instances()[s.instance].mesh;
   return mesh && s.triangle < mesh->triangle_count() && s.numbers[14] > 0.0f && s.numbers[15] > 0.0f;
 }

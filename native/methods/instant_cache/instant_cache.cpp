@@ -2,6 +2,7 @@
 // The instant cache as a method: its settings and statistics. See instant_cache.h.
 #include "methods/instant_cache/instant_cache.h"
 
+#include "base/errors.h"
 #include "methods/instant_cache/cache.h"
 
 namespace afterglow::instant_cache {
@@ -9,6 +10,16 @@ namespace afterglow::instant_cache {
 namespace {
 
 constexpr float kAccuracy = 0.05f;  // where neither the render nor the cache is told one
+
+constexpr const char* kViews[] = {"LIGHT", "RECORDS", "CHANGES", "RAYS", "LIGHTS"};
+
+View view_of(const SettingValue& value) {
+  const auto* text = std::get_if<std::string>(&value);
+  for (int i = 0; i < 5; ++i)
+    if (text && *text == kViews[i]) return View(i);
+  throw InvalidInput("setting 'cache_view' wants LIGHT, RECORDS, CHANGES, RAYS or LIGHTS, not '" +
+                     (text ? *text : "a number") + "'");
+}
 
 class InstantCache final : public IndirectMethod {
  public:
@@ -19,6 +30,7 @@ class InstantCache final : public IndirectMethod {
     s.walk.configure(settings);
     s.lights.configure(settings);
     verify_ = false;
+    view_ = View::kLight;
     float from_render = 0.0f;
     s.accuracy = 0.0f;
     for (const auto& [name, value] : settings) {
@@ -27,6 +39,7 @@ class InstantCache final : public IndirectMethod {
       if (name == "cache_keep") s.keep_updates = uint32_t(integer_of(value));
       if (name == "cache_on_demand") s.on_demand = integer_of(value) != 0;
       if (name == "cache_verify") verify_ = integer_of(value) != 0;
+      if (name == "cache_view") view_ = view_of(value);
     }
     if (!(s.accuracy > 0.0f)) s.accuracy = from_render > 0.0f ? from_render : kAccuracy;
     cache_.configure(s);
@@ -44,7 +57,9 @@ class InstantCache final : public IndirectMethod {
   }
 
   void gather(const CommittedScene&, std::span<const CachePoint> points, std::span<Answer> answers) const override {
-    for (size_t i = 0; i < points.size(); ++i) answers[i] = cache_.answer(points[i]);
+    for (size_t i = 0; i < points.size(); ++i)
+      if (!(answers[i].weight > 0.0f) || cache_.answers_otherwise(points[i]))
+        answers[i] = view_ == View::kLight ? cache_.answer(points[i]) : cache_.show(view_, points[i]);
   }
 
   std::vector<char> save(const CommittedScene& scene) const override { return cache_.save(scene); }
@@ -70,6 +85,7 @@ class InstantCache final : public IndirectMethod {
     add("path_rays", double(c.path_rays));
     add("fill_rays", double(c.fill_rays));
     add("update_rays", double(c.update_rays));
+    add("visibility_rays_now", double(c.rays_now));
     add("cache_bytes", double(cache_.bytes()));
     add("record_bytes", double(cache_.record_bytes()));
     add("seconds_lights", c.seconds_lights);
@@ -86,6 +102,7 @@ class InstantCache final : public IndirectMethod {
  private:
   Cache cache_;
   bool verify_ = false;
+  View view_ = View::kLight;
   Verification verification_;
 };
 
@@ -110,6 +127,12 @@ MethodDescription describe() {
   d.settings.push_back({"cache_verify", "Verify",
                         "Compares every record with a fresh one after each update (slow; for tests)", "", false, 0.0,
                         1.0});
+  d.settings.push_back(
+      {"cache_view", "View",
+       "LIGHT, or what the cache holds: RECORDS, CHANGES (reused blue, updated yellow, new green), RAYS "
+       "traced since the last edit, virtual LIGHTS",
+       "", std::string("LIGHT"), 0.0, 0.0});
+  d.debug_views = {"RECORDS", "CHANGES", "RAYS", "LIGHTS"};
   d.statistics = {"records",         "records_new",    "records_updated", "records_reused", "records_moved",
                   "records_dropped", "virtual_lights", "lights_moved",    "path_rays",      "fill_rays",
                   "update_rays",     "cache_bytes",    "seconds_lights",  "seconds_update", "seconds_fill"};

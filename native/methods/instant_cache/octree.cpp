@@ -6,51 +6,94 @@
 
 namespace afterglow::instant_cache {
 
+namespace {
+
+constexpr float kFar = 1e18f;      // where unused lanes stand: its square is a number
+constexpr float kWider = 1.0001f;  // of a radius: against rounding
+
+}  // namespace
+
 void Octree::clear(const Vec3& center, float half_size) {
   nodes_.assign(1, Node{});
+  entries_.clear(), within_.clear();
   center_ = center;
   half_ = std::max(half_size, 1e-30f);
 }
 
 template <class Visit>
-void Octree::descend(uint32_t node, const Vec3& center, float half, const Record& record, const Visit& visit) {
-  // As small as a node can be whose neighbours, but no others, the record reaches into: eight nodes at most.
-  if (half < 2.0f * record.reach || half < half_ * 0x1p-20f) return visit(nodes_[node]);
+void Octree::descend(uint32_t node, const Vec3& center, float half, const Vec3& position, float within,
+                     const Visit& visit) {
+  // Nodes from one to two radii wide: on a surface a record reaches into some ten of them.
+  if (half < within || half < half_ * 0x1p-20f) return visit(nodes_[node]);
+  uint32_t touched = 0xff;
+  constexpr uint32_t kUpper[3] = {0xaa, 0xcc, 0xf0};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (position[axis] - within > center[axis]) touched &= kUpper[axis];
+    if (position[axis] + within < center[axis]) touched &= ~kUpper[axis];
+  }
   half *= 0.5f;
-  for (uint32_t child = 0; child < 8; ++child) {
+  for (; touched; touched &= touched - 1) {
+    const uint32_t child = uint32_t(std::countr_zero(touched));
     const Vec3 at = center + half * Vec3(child & 1 ? 1.0f : -1.0f, child & 2 ? 1.0f : -1.0f, child & 4 ? 1.0f : -1.0f);
-    const Vec3 outside = glm::max(glm::abs(record.position - at) - half, Vec3(0.0f));
-    if (glm::dot(outside, outside) > record.reach * record.reach * 1.0001f) continue;
     if (nodes_[node].children[child] == kNone) {
       nodes_[node].children[child] = uint32_t(nodes_.size());
       nodes_.emplace_back();
     }
-    descend(nodes_[node].children[child], at, half, record, visit);
+    descend(nodes_[node].children[child], at, half, position, within, visit);
   }
 }
 
-template <class Visit>
-void Octree::visit_nodes(const Record& record, const Visit& visit) {
-  descend(0, center_, half_, record, visit);
+void Octree::place(Node& node, uint32_t at, uint32_t index) const {
+  Block& block = node.blocks[at / kLanes];
+  const uint32_t lane = at % kLanes;
+  const bool none = index == kNone;
+  const Vec3 position = none ? Vec3(kFar) : entries_[index].position;
+  block.x[lane] = position.x, block.y[lane] = position.y, block.z[lane] = position.z;
+  block.inverse_radius[lane] = none ? 1.0f : entries_[index].inverse_radius;
+  block.record[lane] = index;
 }
 
-void Octree::insert(uint32_t index, const Record& record) {
-  const Entry entry{record.position, 1.0f / std::max(record.radius, 1e-30f), record.normal, index,
-                    record.place.instance};
-  visit_nodes(record, [&](Node& node) { node.entries.push_back(entry); });
+void Octree::put(Node& node, uint32_t index) const {
+  if (node.count == node.blocks.size() * kLanes) {
+    node.blocks.emplace_back();
+    for (uint32_t i = 0; i < kLanes; ++i) place(node, node.count + i, kNone);
+  }
+  uint32_t at = node.count++;
+  for (; at > 0; --at) {  // mostly the last
+    const uint32_t before = node.blocks[(at - 1) / kLanes].record[(at - 1) % kLanes];
+    if (before < index) break;
+    place(node, at, before);
+  }
+  place(node, at, index);
+}
+
+void Octree::take(Node& node, uint32_t index) const {
+  bool found = false;
+  for (uint32_t at = 0; at < node.count; ++at) {
+    const uint32_t here = node.blocks[at / kLanes].record[at % kLanes];
+    if (found) place(node, at - 1, here);
+    found |= here == index;
+  }
+  if (found) place(node, --node.count, kNone);
+}
+
+void Octree::insert(uint32_t index, const Record& record, float within) {
+  if (index >= entries_.size()) entries_.resize(index + 1), within_.resize(index + 1, 0.0f);
+  entries_[index] = {record.position, 1.0f / std::max(record.radius, 1e-30f), record.normal, index,
+                     record.place.instance};
+  within_[index] = within;
+  descend(0, center_, half_, record.position, kWider * within, [&](Node& node) { put(node, index); });
 }
 
 void Octree::set_radius(uint32_t index, const Record& record) {
-  const float inverse = 1.0f / std::max(record.radius, 1e-30f);
-  visit_nodes(record, [&](Node& node) {
-    for (Entry& entry : node.entries)
-      if (entry.record == index) entry.inverse_radius = inverse;
-  });
+  if (within_[index] == record.radius) return;
+  descend(0, center_, half_, record.position, kWider * within_[index], [&](Node& node) { take(node, index); });
+  insert(index, record, record.radius);
 }
 
 size_t Octree::bytes() const {
-  size_t sum = nodes_.capacity() * sizeof(Node);
-  for (const Node& node : nodes_) sum += node.entries.capacity() * sizeof(Entry);
+  size_t sum = nodes_.capacity() * sizeof(Node) + entries_.capacity() * (sizeof(Entry) + sizeof(float));
+  for (const Node& node : nodes_) sum += node.blocks.capacity() * sizeof(Block);
   return sum;
 }
 

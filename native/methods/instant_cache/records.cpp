@@ -58,6 +58,22 @@ void VisibilityTable::reset(uint32_t slots, bool coloured) {
   seen_.clear(), unknown_.clear(), transmittance_.clear();
 }
 
+void VisibilityTable::set_coloured(bool coloured) {
+  if (coloured == coloured_) return;
+  if (coloured) transmittance_.assign(rows_ * slots_, 0);
+  for (size_t row = 0; row < rows_; ++row)
+    for (uint32_t k = 0; k < slots_; ++k) {
+      const uint64_t bit = uint64_t(1) << (k % 64);
+      if (!(seen(row)[k / 64] & bit)) continue;
+      if (coloured)
+        transmittance_[row * slots_ + k] = 0xffff;
+      else if (transmittance_[row * slots_ + k] != 0xffff)
+        unknown(row)[k / 64] |= bit;
+    }
+  if (!coloured) transmittance_ = {};
+  coloured_ = coloured;
+}
+
 void VisibilityTable::add_row() {
   rows_++;
   seen_.resize(rows_ * words_, 0);

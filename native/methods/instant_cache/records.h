@@ -27,8 +27,10 @@ struct Record {
   float reach = 0.0f;      // radius under which it stands in the octree
   float radius = 0.0f;     // within which it may be used, at most reach
   Rgb irradiance{0.0f};
-  uint32_t used = 0;   // the update after which it last answered
-  bool ready = false;  // no visibility is unknown
+  float measured = -1.0f;        // luminance of its light when its radius was found
+  uint32_t born = 0, asked = 0;  // the updates after which it was made, and rays were last traced for it
+  uint32_t rays = 0;             // so many
+  bool ready = false;            // no visibility is unknown
 };
 
 /// Where the place is now. False: the triangle has no area.
@@ -43,6 +45,8 @@ Rgb unpack_transmittance(uint16_t);
 class VisibilityTable {
  public:
   void reset(uint32_t slots, bool coloured);
+  /// What is seen through something is unknown where transmittance is no longer kept.
+  void set_coloured(bool);
   uint32_t words() const { return words_; }  // of 64 bits, a row
   bool coloured() const { return coloured_; }
   size_t rows() const { return rows_; }

@@ -21,12 +21,13 @@ from typing import Any
 import numpy as np
 
 from .. import blenders, chart
-from . import foundation, hash_cache
+from . import foundation, hash_cache, instant_cache
 from .figure import Context, Figure, table
 from .machine import machine, versions
 
 Measure = Callable[[Context], list[Figure]]
-SETS: dict[str, Mapping[str, Measure]] = {"foundation": foundation.FIGURES, "hash_cache": hash_cache.FIGURES}
+SETS: dict[str, Mapping[str, Measure]] = {
+    "foundation": foundation.FIGURES, "hash_cache": hash_cache.FIGURES, "instant_cache": instant_cache.FIGURES}
 # What a figure of <name>.json has.
 COLUMNS = ("figure", "scene", "value", "unit", "peer", "peer_value", "ratio", "goal", "holds", "command")
 
