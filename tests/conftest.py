@@ -32,6 +32,13 @@ def pytest_report_header() -> list[str]:
     return [f"afterglow: module from {LIBRARY}; scenes from {find_scenes() or 'nowhere (tests that need them are skipped)'}"]
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    sanitizer = os.environ.get("AFTERGLOW_SANITIZER")
+    for item in items:
+        if sanitizer and item.get_closest_marker("timing"):
+            item.add_marker(pytest.mark.skip(reason=f"{sanitizer} multiplies the times that this test holds"))
+
+
 @pytest.fixture(scope="session")
 def root() -> Path:
     """The project's folder."""

@@ -31,8 +31,9 @@ def test_render_writes_an_image(library: Path, tmp_path: Path) -> None:
 
 
 def test_accuracy_of_a_procedural_scene(library: Path, tmp_path: Path) -> None:
-    arguments = ("accuracy", "cornell_box", "--percent", "12", "--samples", "512", "--repeats", "2", "--budget", "4", "--method",
-                 "PATH_TRACING", "--output", str(tmp_path / "out"))
+    budget = "60" if os.environ.get("AFTERGLOW_SANITIZER") else "4"  # seconds of a setting; sanitizers multiply them
+    arguments = ("accuracy", "cornell_box", "--percent", "12", "--samples", "512", "--repeats", "2", "--budget", budget,
+                 "--method", "PATH_TRACING", "--output", str(tmp_path / "out"))
     ended = run(library, *arguments, AFTERGLOW_CACHE=str(tmp_path / "cache"))
     assert ended.returncode == 0, ended.stderr + ended.stdout
     report = json.loads((tmp_path / "out" / "accuracy_cornell_box.json").read_text())

@@ -97,6 +97,7 @@ def test_lamps_in_one_place_shine_together() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timing
 def test_ten_thousand_lamps_with_a_shape_cost_little_more_than_ten() -> None:
     random = np.random.default_rng(2)
 

@@ -347,6 +347,7 @@ def test_tree_densities_agree_for_many_shapes() -> None:
     assert wrong[met].mean() < 1e-3
 
 
+@pytest.mark.timing
 def test_ten_thousand_lights_are_quick() -> None:
     scene, _, _ = many_lights(10_000)
     assert min(scene_commit_seconds(scene) for _ in range(3)) < 0.05
