@@ -22,6 +22,7 @@ with open(jobs_file) as file:
     given = json.load(file)
 package = next(name for name in ("bl_ext.user_default.afterglow", "render_afterglow") if name in sys.modules)
 sync = importlib.import_module(package + ".sync")
+importlib.import_module(package + ".sync.camera")
 afterglow = importlib.import_module(package + ".backend").afterglow
 
 scene = bpy.context.scene
@@ -55,10 +56,9 @@ def look(native: "afterglow.Scene", at: "float | None") -> None:
         matrix[:3, 3] += step * (math.sin(turn) * matrix[:3, 0] - 0.5 * (1 - math.cos(turn)) * matrix[:3, 2])
         across = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
         matrix[:3, :3] = across @ matrix[:3, :3]
-    data = camera.data
-    half = math.tan(0.5 * data.angle)  # of the longer side
-    x, y = (half, half * height / width) if width >= height else (half * width / height, half)
-    native.set_camera("perspective", matrix, window=(-x, x, -y, y), clip=(data.clip_start, data.clip_end))
+    projection = camera.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=width, y=height)
+    clip = (camera.data.clip_start, camera.data.clip_end)
+    native.set_camera("perspective", matrix, window=sync.camera.window_of(projection), clip=clip)
 
 
 def render(native: "afterglow.Scene", job: dict, images: dict) -> dict:
@@ -79,7 +79,7 @@ def render(native: "afterglow.Scene", job: dict, images: dict) -> dict:
 
 def main() -> None:
     native, keeper, seconds = read_scene()
-    images, answers = {}, [{"seconds": seconds, "triangles": native.bytes}]
+    images, answers = {}, [{"seconds": seconds, "bytes": native.bytes}]
     for job in given["jobs"]:
         if job["do"] == "render":
             answers.append(render(native, job, images))
