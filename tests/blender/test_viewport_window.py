@@ -164,7 +164,8 @@ def test_animated_and_driven_properties_are_seen(in_window: Run) -> None:
             seen.setdefault(name, []).append(level())
         def steps():
             full_view(); yield 1.0
-            for name, owner, kind in (('object', cube, 'OBJECT'), ('mesh', cube.data, 'OBJECT'), ('world', s.world, 'VIEW_LAYER')):
+            owners = ('object', cube, 'OBJECT'), ('mesh', cube.data, 'OBJECT'), ('world', s.world, 'VIEW_LAYER')
+            for name, owner, kind in owners:
                 asked.attribute_type = kind
                 for frame in (1, 11):
                     owner['glow'] = frame / 10 - 0.1

@@ -48,7 +48,7 @@ def samples_per_second(context: Context) -> list[Figure]:
     """The slope between two sample counts, so that set-up falls out."""
     cases = [(blenders.project() / "blend_files" / "cornell_box.blend", 100, 16, 160)]
     try:
-        cases.append((scene()[0], PERCENT, 2, 14))
+        cases.append((scene()[0], PERCENT, 4, 44))
     except blenders.Unavailable as reason:
         context.say(f"      kitchen left out: {reason}")
     figures = []
