@@ -296,6 +296,37 @@ void geometry_terms(const VirtualLightColumns& c, const Vec3& p, const Vec3& n, 
   }
 }
 
+void geometry_slopes(const VirtualLightColumns& c, const Vec3& p, const Frame& frame, float bound,
+                     GeometrySlopes& out) {
+  const float near = 0.8f * bound, scale = bound > 0.0f ? 1.0f / (0.4f * bound) : 0.0f;
+  const Vec3 t = frame.t, b = frame.b, n = frame.n;
+  const size_t size = c.padded();
+  out.resize(size);
+  const float *x = c.x.data(), *y = c.y.data(), *z = c.z.data(), *nx = c.nx.data(), *ny = c.ny.data(),
+              *nz = c.nz.data();
+  float *step_t = out.step_t.data(), *step_b = out.step_b.data(), *turn_t = out.turn_t.data(),
+        *turn_b = out.turn_b.data();
+  const float least = c.two_sided ? -kInfinity : 0.0f;
+#pragma GCC ivdep
+  for (size_t i = 0; i < size; ++i) {
+    const float dx = x[i] - p.x, dy = y[i] - p.y, dz = z[i] - p.z;
+    const float d2 = std::max(dx * dx + dy * dy + dz * dz, 1e-30f), d = std::sqrt(d2);
+    const float here = dx * n.x + dy * n.y + dz * n.z;
+    const float there = -(dx * nx[i] + dy * ny[i] + dz * nz[i]);
+    float s = bound > 0.0f ? (d - near) * scale : 1.0f;
+    s = std::min(std::max(s, 0.0f), 1.0f);
+    const float f = s * s * (3.0f - 2.0f * s), slope = 6.0f * s * (1.0f - s) * scale;  // of the bound
+    const float over_d4 = 1.0f / d2 / d2, above = here > 0.0f ? over_d4 : 0.0f, lit = there > least ? above : 0.0f;
+    // Only the way to the light changes, by −step: cos of the place stays for steps along its plane.
+    const float facing = lit * f * here, nearer = lit * here * there * (4.0f * f / d2 - slope / d);
+    const float along_t = dx * t.x + dy * t.y + dz * t.z, along_b = dx * b.x + dy * b.y + dz * b.z;
+    step_t[i] = facing * (nx[i] * t.x + ny[i] * t.y + nz[i] * t.z) + nearer * along_t;
+    step_b[i] = facing * (nx[i] * b.x + ny[i] * b.y + nz[i] * b.z) + nearer * along_b;
+    turn_t[i] = lit * f * there * along_t;
+    turn_b[i] = lit * f * there * along_b;
+  }
+}
+
 bool can_see(const Vec3& position, const Vec3& face_normal, const VirtualLight& light, bool front) {
   const Vec3 way = light.position - position;
   return glm::dot(way, face_normal) > 0.0f && (glm::dot(way, light.face_normal) < 0.0f) == front;

@@ -68,6 +68,16 @@ inline float smooth_bound(float a, float b, float x) {
 /// Negative where the light shows its back. m = 0: no bound.
 void geometry_terms(const VirtualLightColumns&, const Vec3& position, const Vec3& normal, float bound, float* out);
 
+/// The same terms' derivatives, [padded()] each: over steps along t and b (of a frame whose normal is the place's), and
+/// over turns of the normal towards t and b. As in Ward and Heckbert 1992, but exact, since each light is known.
+struct GeometrySlopes {
+  std::vector<float> step_t, step_b, turn_t, turn_b;
+  void resize(size_t size) {
+    for (auto* column : {&step_t, &step_b, &turn_t, &turn_b}) column->resize(size);
+  }
+};
+void geometry_slopes(const VirtualLightColumns&, const Vec3& position, const Frame&, float bound, GeometrySlopes& out);
+
 /// Whether both faces (not only the smooth normals) look at each other. front: the side that shines.
 bool can_see(const Vec3& position, const Vec3& face_normal, const VirtualLight&, bool front);
 /// The ray that asks whether a light is seen; from above the point's face, to above the light's.

@@ -42,6 +42,12 @@ enum class View : uint8_t { kLight, kRecords, kChanges, kRays, kLights };
 
 constexpr float kAsItIs = 2.0f;  // an answer's weight: no light, a colour that is shown as it is
 
+/// Memory that threads use for one record after the other: a value for each light.
+struct Sums {
+  std::vector<float> terms, front, back;  // geometry_terms(); luminance that arrives from either side of what is seen
+  GeometrySlopes slopes;
+};
+
 class Cache {
  public:
   void configure(const CacheSettings&);
@@ -79,7 +85,9 @@ class Cache {
   /// Asks what is unknown of these records and sums their light anew.
   uint64_t resolve(const CommittedScene&, std::span<const uint32_t> records, Work&);
   void ask(const WalkScene&, size_t record, float* terms, RayCounts&);
-  void sum(size_t record, float* terms);
+  void sum(size_t record, Sums&);
+  void find_gradients(size_t record, Sums&);
+  float find_radius(size_t record, Sums&) const;
   Rgb irradiance(size_t row, const float* terms) const;
   WalkScene walk(const CommittedScene& scene) const {
     return {scene, settings_.walk.limits, shown_.empty() ? nullptr : &shown_, false};

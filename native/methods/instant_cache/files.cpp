@@ -13,7 +13,7 @@ namespace afterglow::instant_cache {
 namespace {
 
 constexpr char kMagic[16] = "afterglow icach";
-constexpr uint32_t kFormat = 1;
+constexpr uint32_t kFormat = 2;
 
 /// FNV-1a over the bytes of plain values.
 class Fingerprint {
@@ -96,7 +96,7 @@ struct SavedLight {
 };
 struct SavedRecord {
   uint32_t instance, triangle, back;
-  float u, v, numbers[16];
+  float u, v, numbers[34];
   float measured;
   uint32_t born, asked, rays, used, ready, wanted;
 };
@@ -129,6 +129,8 @@ SavedRecord saved(const Record& r, uint32_t used, uint8_t wanted) {
   s.instance = r.place.instance, s.triangle = r.place.triangle, s.back = r.place.back, s.u = r.place.u, s.v = r.place.v;
   float* at = s.numbers;
   for (const Vec3* v : {&r.position, &r.normal, &r.face_normal, &r.irradiance}) put(at, *v);
+  for (const glm::mat3* m : {&r.by_step, &r.by_turn})
+    for (int i = 0; i < 3; ++i) put(at, (*m)[i]);
   *at++ = r.error, *at++ = r.footprint, *at++ = r.reach, *at = r.radius;
   s.measured = r.measured, s.born = r.born, s.asked = r.asked, s.rays = r.rays;
   s.used = used, s.ready = r.ready, s.wanted = wanted;
@@ -140,6 +142,8 @@ Record restored(const SavedRecord& s) {
   r.place = {s.instance, s.triangle, s.u, s.v, s.back != 0};
   const float* at = s.numbers;
   for (Vec3* v : {&r.position, &r.normal, &r.face_normal, &r.irradiance}) *v = take(at);
+  for (glm::mat3* m : {&r.by_step, &r.by_turn})
+    for (int i = 0; i < 3; ++i) (*m)[i] = take(at);
   r.error = *at++, r.footprint = *at++, r.reach = *at++, r.radius = *at;
   r.measured = s.measured, r.born = s.born, r.asked = s.asked, r.rays = s.rays;
   r.ready = s.ready != 0;
@@ -151,7 +155,7 @@ bool sound(const Scene& scene, const SavedRecord& s) {
     if (!std::isfinite(number)) return false;
   if (!std::isfinite(s.measured) || s.instance >= scene.instances().size()) return false;
   const Mesh* mesh = scene.instances()[s.instance].mesh;
-  return mesh && s.triangle < mesh->triangle_count() && s.numbers[14] > 0.0f && s.numbers[15] > 0.0f;
+  return mesh && s.triangle < mesh->triangle_count() && s.numbers[32] > 0.0f && s.numbers[33] > 0.0f;
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Which records answer for a point, and how much each counts: pure functions. After (4) and (5) of Debattista et al.
 // 2009, with distances in units of the record's radius (the paper's (5) adds a length to a pure number), the weight
-// zero at the border of a record (Tabellion and Lamorlette 2004) so that no edge is seen there, finite at its centre,
-// and Ward's test for records in front of or behind the point's surface.
+// smooth and zero at the border of a record (Tabellion and Lamorlette 2004) so that no edge is seen there, Ward's test
+// for records in front of or behind the point's surface, and Ward and Heckbert's gradients (1992).
 #pragma once
 
 #include <algorithm>
@@ -14,19 +14,13 @@ namespace afterglow::instant_cache {
 /// How far records reach, from the relative error that is accepted.
 struct Spacing {
   float most_pixels = 20.0f, least_pixels = 2.5f;  // radius in footprints of a pixel
-  float change = 0.3f;                             // of the light within a radius, relative
-  float angle_scale = 2.7f;                        // 1 / sqrt(1 − cos of the angle at which a record counts no more)
+  float bend = 0.15f;        // how far light at the radius may be from what the gradient tells, relative
+  float angle_scale = 2.7f;  // 1 / sqrt(1 − cos of the angle at which a record counts no more)
 };
 
 inline Spacing spacing_of(float accuracy) {
-  const float s = std::sqrt(std::clamp(accuracy, 0.0005f, 1.0f) / 0.05f);
-  return {20.0f * s, 2.5f * std::min(s, 1.0f), 0.3f * s, 2.7f / std::clamp(s, 0.25f, 1.5f)};
-}
-
-/// Radius of a record from its light's steepest relative change per length, and the pixel that asked for it.
-inline float record_radius(const Spacing& s, float relative_slope, float footprint) {
-  const float least = s.least_pixels * footprint, most = s.most_pixels * footprint;
-  return relative_slope * most > s.change ? std::max(s.change / relative_slope, least) : most;
+  const float e = std::clamp(accuracy, 0.0005f, 1.0f), s = std::sqrt(e / 0.05f);
+  return {20.0f * s, 2.5f * std::min(s, 1.0f), 3.0f * e, 2.7f / std::clamp(s, 0.25f, 1.5f)};
 }
 
 /// How far a record is from being usable at a point: 0 at its centre, 1 at its border. limit: the largest radius that
@@ -44,6 +38,18 @@ inline float distance_to_record(const Entry& e, const CachePoint& p, float limit
   return off < 0.1f ? distance : 1.0f;
 }
 
-inline float record_weight(float distance) { return (1.0f - distance) / (distance + 0.02f); }
+/// No peak in the middle, where each record would be seen as a facet, and no edge at the border.
+inline float record_weight(float distance) { return (1.0f - distance) * (1.0f - distance); }
+
+/// What a straight line may make of a record's light: near a light or in a corner none is true for long.
+inline Rgb bounded_light(const Rgb& line, const Rgb& at_record) {
+  return glm::clamp(line, 0.5f * at_record, 2.0f * at_record);
+}
+
+/// Light of a record for a point nearby: along its gradients (Ward and Heckbert 1992).
+inline Rgb light_at(const Record& r, const CachePoint& p) {
+  return bounded_light(r.irradiance + r.by_step * (p.position - r.position) + r.by_turn * (p.normal - r.normal),
+                       r.irradiance);
+}
 
 }  // namespace afterglow::instant_cache
