@@ -35,6 +35,7 @@ def test_start_wait_and_statistics() -> None:
     assert t["seconds"]["render"] > 0 and t["bytes"]["film"] > 0
 
 
+@pytest.mark.timing
 def test_cancel_returns_within_fifty_milliseconds() -> None:
     _, s = session(samples=1_000_000, width=256, height=256)
     longest = 0.0
