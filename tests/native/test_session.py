@@ -188,6 +188,7 @@ def test_viewport_shows_whole_images_from_the_first_on() -> None:
     np.testing.assert_allclose(final, still.read(), rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.timing
 def test_viewport_answers_an_edit_soon() -> None:
     built, s = session(samples=1_000_000, viewport=True, width=160, height=120)
     s.start()
