@@ -3,6 +3,9 @@
 // their triangles in world space. A moved instance rebuilds the top level alone.
 #include <algorithm>
 #include <exception>
+#if defined(__SANITIZE_THREAD__)
+#include <sanitizer/tsan_interface.h>
+#endif
 
 #include "base/errors.h"
 #include "base/parallel.h"
@@ -22,9 +25,15 @@ RayCaster::State::State() : device(rtcNewDevice(nullptr)) {
         state.error_text = text ? text : "";
       },
       this);
+#if defined(__SANITIZE_THREAD__)
+  __tsan_release(this);  // Embree's workers, which the sanitizer does not follow, are given what was built up to here
+#endif
   rtcSetDeviceMemoryMonitorFunction(
       device,
       [](void* self, ssize_t bytes, bool) {
+#if defined(__SANITIZE_THREAD__)
+        __tsan_acquire(self);
+#endif
         static_cast<State*>(self)->device_bytes += bytes;
         return true;
       },

@@ -366,6 +366,7 @@ def test_local_places_of_many_instances(ag) -> None:
     assert np.array_equal(hit[1::2], handles[1::2]) and np.array_equal(hit[::4], again) and (hit[2::4] == 0).all()
 
 
+@pytest.mark.timing
 def test_the_wrapper_costs_little(ag) -> None:
     positions, triangles = sphere(64, 128)
     scene = ag.Scene()

@@ -27,9 +27,13 @@ PARTS = {"Direct": "Dir", "Indirect": "Ind"}
 DIVIDED = ", divided"
 
 
+# Black, so that Cycles' mean is its own leak through the edges (0.010 of 1000 outside; here 0.0003): tests hold it against black.
+BLACK = {"sealed_box"}
+
+
 def files() -> list[tuple[Path, dict[str, int]]]:
-    """Every file of blend_files, and the kitchen where it is."""
-    found = sorted((blenders.project() / "blend_files").glob("*.blend"))
+    """Every file of blend_files that is not black, and the kitchen where it is."""
+    found = [path for path in sorted((blenders.project() / "blend_files").glob("*.blend")) if path.stem not in BLACK]
     try:
         found += [path for path in [blenders.shared_scenes() / "country_kitchen.blend"] if path.is_file()]
     except blenders.Unavailable:
