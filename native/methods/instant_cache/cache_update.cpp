@@ -260,7 +260,8 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
             for (uint64_t bits = crosses[w] & (old ? before[w] : after[w]) & (front_[w] | back_[w]) & ~unknown[w]; bits;
                  bits &= bits - 1) {
               const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
-              if (old ? visibility_.could_brighten(index, k) : visibility_.could_darken(index, k))
+              if ((old ? visibility_.could_brighten(index, k) : visibility_.could_darken(index, k)) &&
+                  crosses_parts(old ? m.before : m.after, from, lights_.lights[k].position, slack))
                 unknown[w] |= uint64_t(1) << (k % 64);
             }
         }

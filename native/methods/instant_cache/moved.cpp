@@ -9,11 +9,48 @@ namespace afterglow::instant_cache {
 
 namespace {
 
+constexpr uint32_t kMostParts = 64;  // of a mesh
+constexpr float kFar = 1e37f;        // where boxes stand that no ray meets
+
 bool same(const Affine& a, const Affine& b) { return a.x == b.x && a.y == b.y && a.z == b.z && a.p == b.p; }
 
 Box widened(const Box& box, float share, float least) {
   const Vec3 by = share * glm::max(box.size(), glm::max(glm::abs(box.lower), glm::abs(box.upper))) + least;
   return {box.lower - by, box.upper + by};
+}
+
+/// The parts are the triangles whose middles lie in a cell of a grid of cubes over the mesh: as many as kMostParts
+/// allows, so that a long thing is cut along its length. One pass over the triangles.
+std::shared_ptr<const Parts> parts_of(const Mesh& mesh) {
+  const Vec3 size = mesh.bounds.size();
+  float cell = max_component(size) / 16.0f;
+  if (!(cell > 0.0f) || !std::isfinite(cell)) return nullptr;
+  const auto cells_along = [&](int axis) { return std::max(uint32_t(std::ceil(size[axis] / cell)), 1u); };
+  while (cells_along(0) * cells_along(1) * cells_along(2) > kMostParts) cell *= 1.2f;
+  const uint32_t nx = cells_along(0), ny = cells_along(1), nz = cells_along(2);
+  std::vector<Box> boxes(size_t(nx) * ny * nz);
+  for (size_t t = 0; t + 2 < mesh.triangles.size(); t += 3) {
+    if (mesh.triangles[t] == mesh.triangles[t + 1] && mesh.triangles[t] == mesh.triangles[t + 2]) continue;  // left out
+    const Vec3 &a = mesh.positions[mesh.triangles[t]], &b = mesh.positions[mesh.triangles[t + 1]],
+               &c = mesh.positions[mesh.triangles[t + 2]];
+    const Vec3 at = ((a + b + c) / 3.0f - mesh.bounds.lower) / cell;
+    const auto index = [](float x, uint32_t n) { return std::min(uint32_t(std::max(x, 0.0f)), n - 1); };
+    Box& box = boxes[index(at.x, nx) + nx * (index(at.y, ny) + ny * index(at.z, nz))];
+    box.extend(a), box.extend(b), box.extend(c);
+  }
+  std::erase_if(boxes, [](const Box& box) { return box.empty(); });
+  if (boxes.size() < 2) return nullptr;
+  auto parts = std::make_shared<Parts>();
+  for (int axis = 0; axis < 3; ++axis) {
+    parts->lower[axis].assign((boxes.size() + 7) / 8 * 8, kFar);
+    parts->upper[axis].assign(parts->lower[axis].size(), kFar);
+  }
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    const Box box = widened(boxes[i], 2e-5f, 1e-5f * max_component(size));
+    for (int axis = 0; axis < 3; ++axis)
+      parts->lower[axis][i] = box.lower[axis], parts->upper[axis][i] = box.upper[axis];
+  }
+  return parts;
 }
 
 Bounds bounds_of(const InstanceRecord& record) {
@@ -44,6 +81,7 @@ std::vector<Moved> Placement::update(const CommittedScene& committed, const Scen
     for (const Handle handle : *list)
       if (const uint32_t index = scene.material_index(handle); index < edited.size()) edited[index] = 1;
   std::vector<Moved> moved;
+  std::unordered_map<Handle, std::shared_ptr<const Parts>> made;
   const size_t count = std::max(records.size(), objects_.size());
   objects_.resize(count);
   for (uint32_t i = 0; i < count; ++i) {
@@ -72,6 +110,17 @@ std::vector<Moved> Placement::update(const CommittedScene& committed, const Scen
     now.bounds = !placed_otherwise ? before.bounds : now.handle ? bounds_of(records[i]) : Bounds{};
     if (placed_otherwise || lets_through_otherwise) {
       const bool keeps = mesh_stays && !replaced;
+      if (placed_otherwise && mesh_stays) {  // what moved once may move again; others need no parts
+        const bool shape_stays = !deformed && !replaced;
+        std::shared_ptr<const Parts> parts = shape_stays ? before.bounds.parts : nullptr;
+        if (!parts) {
+          std::shared_ptr<const Parts>& known = made[now.mesh];
+          if (!known) known = parts_of(*records[i].mesh);
+          parts = known;
+        }
+        now.bounds.parts = parts;
+        if (shape_stays) before.bounds.parts = parts;
+      }
       moved.push_back({i, before.handle ? before.bounds : Bounds{}, now.bounds, keeps, !placed_otherwise});
     }
     before = std::move(now);
@@ -107,6 +156,35 @@ void crossing(const Bounds& bounds, const Vec3& from, float slack, const float* 
     for (uint32_t k = 0; k < here; ++k) word |= uint64_t(hits[k]) << k;
     bits[first / 64] = word;
   }
+}
+
+bool crosses_parts(const Bounds& bounds, const Vec3& from, const Vec3& to, float slack) {
+  if (!bounds.parts) return true;
+  const Affine& m = bounds.to_object;
+  const Vec3 o = m.point(from), end = m.point(to);
+  const Vec3 reach = slack * (glm::abs(m.x) + glm::abs(m.y) + glm::abs(m.z));
+  Vec3 inverse;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float d = end[axis] - o[axis];
+    inverse[axis] = 1.0f / (std::fabs(d) < 1e-30f ? 1e-30f : d);
+  }
+  const Parts& p = *bounds.parts;
+  const float *lx = p.lower[0].data(), *ly = p.lower[1].data(), *lz = p.lower[2].data();
+  const float *ux = p.upper[0].data(), *uy = p.upper[1].data(), *uz = p.upper[2].data();
+  const size_t count = p.lower[0].size();
+  for (size_t first = 0; first < count; first += 8) {
+    uint32_t any = 0;
+    for (size_t i = first; i < first + 8; ++i) {
+      const float x0 = (lx[i] - reach.x - o.x) * inverse.x, x1 = (ux[i] + reach.x - o.x) * inverse.x;
+      const float y0 = (ly[i] - reach.y - o.y) * inverse.y, y1 = (uy[i] + reach.y - o.y) * inverse.y;
+      const float z0 = (lz[i] - reach.z - o.z) * inverse.z, z1 = (uz[i] + reach.z - o.z) * inverse.z;
+      const float enter = std::max(std::max(std::min(x0, x1), std::min(y0, y1)), std::max(std::min(z0, z1), 0.0f));
+      const float leave = std::min(std::min(std::max(x0, x1), std::max(y0, y1)), std::min(std::max(z0, z1), 1.0f));
+      any |= uint32_t(enter <= leave * (1.0f + 1e-5f) + 1e-6f);
+    }
+    if (any) return true;
+  }
+  return false;
 }
 
 void crossing_from_box(const Box& moved, const Box& from, const float* x, const float* y, const float* z,

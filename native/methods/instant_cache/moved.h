@@ -4,17 +4,24 @@
 // Each has its old and its new bounds, in its own space, so that a turned box stays tight.
 #pragma once
 
+#include <memory>
 #include <unordered_map>
 
 #include "transport/committed_scene.h"
 
 namespace afterglow::instant_cache {
 
+/// Boxes around the parts of a mesh, in its own space, a column for each plane, padded to a multiple of eight.
+struct Parts {
+  std::vector<float> lower[3], upper[3];
+};
+
 /// A box in an object's space. Empty: the object was not there.
 struct Bounds {
   Affine to_object;
-  Box box;    // widened a little, against rounding
-  Box world;  // around it
+  Box box;                             // widened a little, against rounding
+  Box world;                           // around it
+  std::shared_ptr<const Parts> parts;  // null: none were made
   bool present() const { return !box.empty(); }
 };
 
@@ -47,6 +54,9 @@ class Placement {
 /// far from both ends, in world space, the ray may really begin and end.
 void crossing(const Bounds&, const Vec3& from, float slack, const float* x, const float* y, const float* z,
               uint32_t count, uint64_t* bits);
+
+/// Whether the way from the point to another may cross a part of the object; true where it has none.
+bool crosses_parts(const Bounds&, const Vec3& from, const Vec3& to, float slack);
 
 /// One bit a light: whether any way from the box `from` to it may cross the box `moved`, in world space.
 void crossing_from_box(const Box& moved, const Box& from, const float* x, const float* y, const float* z,
