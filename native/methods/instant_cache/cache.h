@@ -73,6 +73,8 @@ class Cache {
   void follow(const CommittedScene&, const std::vector<Moved>&);
   void mark_crossings(const std::vector<Moved>&, Work&);
   void mark(size_t record, const std::vector<uint64_t>& slots);
+  /// Whether the last frame was interrupted, told from how many records it asked.
+  void look_back();
   void age();
   void keep(const std::vector<uint32_t>& kept);
   void rebuild_octree();
@@ -113,6 +115,8 @@ class Cache {
   mutable std::vector<uint32_t> used_;   // the update after which a record last answered
   mutable std::vector<uint8_t> wanted_;  // asked for while something of it was unknown
   uint32_t update_ = 0;
+  size_t asked_whole_ = 0;    // records that a whole frame asked, lately
+  uint32_t interrupted_ = 0;  // frames since the last whole one: in these, records are not used for no fault of theirs
   CacheCounts counts_;
 };
 

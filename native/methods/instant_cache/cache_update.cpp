@@ -75,6 +75,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   // stays.
   const bool scaled = center != center_ || radius != radius_ || bound != bound_;
   shown_ = shown, center_ = center, radius_ = radius, bound_ = bound;
+  look_back();
   update_++;
   const bool all = stale_;
   if (all) {
@@ -270,11 +271,17 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
   });
 }
 
+void Cache::look_back() {
+  const size_t asked = size_t(std::count(used_.begin(), used_.end(), update_));
+  interrupted_ = 2 * asked >= asked_whole_ ? 0 : interrupted_ + 1;
+  asked_whole_ = std::max(asked, asked_whole_ - asked_whole_ / 16);
+}
+
 void Cache::age() {
   if (!settings_.keep_updates) return;
   std::vector<uint32_t> kept;
   for (uint32_t i = 0; i < records_.size(); ++i)
-    if (update_ - used_[i] <= settings_.keep_updates) kept.push_back(i);
+    if (update_ - used_[i] <= settings_.keep_updates + interrupted_) kept.push_back(i);
   if (kept.size() == records_.size()) return;
   counts_.dropped += records_.size() - kept.size();
   keep(kept);
