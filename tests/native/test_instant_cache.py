@@ -356,3 +356,20 @@ def test_views_show_what_the_cache_holds() -> None:
     with pytest.raises(afterglow.InvalidInput, match="cache_view"):
         live.session.update({"cache_view": "NOTHING"})
         live.session.wait()
+
+
+def test_frames_that_ask_for_little_make_no_record_old() -> None:
+    """As while something is dragged, and each frame is interrupted by the next edit."""
+    live = Live(room(), width=48, height=48, cache_keep=2)
+    lamp, before = live.built.lights["Lamp"], number(live, "records")
+    live.session.update({"region": (0, 0, 12, 12)})
+    live.session.wait()
+    for power in range(20, 28):
+        live.edit(lambda power=power: live.scene.set_light(lamp, power=float(power)))
+    assert number(live, "records") >= before and number(live, "records_dropped") == 0
+    live.session.update({"region": (0, 0, 48, 48)})
+    live.session.wait()
+    assert number(live, "records_new") <= 0.1 * before
+    for power in range(20, 28):  # whole frames, in which nobody looks at what is hidden
+        live.edit(lambda power=power: live.scene.set_light(lamp, power=float(power)))
+    assert number(live, "records") <= 1.1 * before
