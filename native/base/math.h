@@ -46,6 +46,9 @@ struct Box {
   void extend(const Vec3& v) { lower = glm::min(lower, v), upper = glm::max(upper, v); }
   void extend(const Box& b) { lower = glm::min(lower, b.lower), upper = glm::max(upper, b.upper); }
   bool empty() const { return !(lower.x <= upper.x); }
+  bool contains(const Vec3& v) const {
+    return v.x >= lower.x && v.y >= lower.y && v.z >= lower.z && v.x <= upper.x && v.y <= upper.y && v.z <= upper.z;
+  }
   Vec3 center() const { return 0.5f * (lower + upper); }
   Vec3 size() const { return upper - lower; }
 };

@@ -64,11 +64,12 @@ void Cache::note_use(uint32_t record) const {
   if (used.load(std::memory_order_relaxed) != update_) used.store(update_, std::memory_order_relaxed);
 }
 
-bool Cache::covered(const Octree& octree, const CachePoint& p) const {
+bool Cache::covered(const CachePoint& p) const {
   const float limit = spacing_.most_pixels * p.footprint;
   bool found = false;
-  octree.find(p.position, 1.0f / limit, [&](const Entry& e) {
-    found = distance_to_record(e, p, limit, spacing_.angle_scale) < 1.0f;
+  octree_.find(p.position, 1.0f / limit, [&](const Entry& e) {
+    const float distance = distance_to_record(e, p, limit, spacing_.angle_scale);
+    found = distance < 1.0f && record_weight(distance) > kCoveringWeight;
     return !found;
   });
   return found;
@@ -107,8 +108,8 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   for (std::vector<uint32_t>& asked : rounds)
     while (!work.stop.stop()) {
       open.assign(asked.size(), 0);
-      parallel_blocks(asked.size(), 256, work.threads, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) open[i] = !covered(octree_, points[asked[i]]);
+      parallel_blocks(asked.size(), 512, work.threads, [&](size_t begin, size_t end) {
+        find_open(points, std::span(asked).subspan(begin, end - begin), open.data() + begin);
       });
       size_t left = 0;
       for (size_t i = 0; i < asked.size(); ++i)
@@ -116,7 +117,7 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
       asked.resize(left);
       const uint32_t first = uint32_t(records_.size());
       for (const uint32_t i : asked)
-        if (!covered(octree_, points[i]) && !insert(scene, points[i])) counts_.refused++;
+        if (!covered(points[i]) && !insert(scene, points[i])) counts_.refused++;
       if (records_.size() == first) break;
       std::vector<uint32_t> fresh(records_.size() - first);
       for (uint32_t i = 0; i < fresh.size(); ++i) fresh[i] = first + i;
@@ -124,11 +125,15 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
     }
   fresh_.clear(center_, radius_);
   has_fresh_ = records_.size() > before;
-  for (uint32_t i = before; i < records_.size(); ++i) fresh_.insert(i - before, records_[i], records_[i].radius);
+  fresh_box_ = Box{};
+  for (uint32_t i = before; i < records_.size(); ++i) {
+    const Record& record = records_[i];
+    fresh_.insert(i - before, record, record.radius);
+    const float reach = 1.001f * record.radius;
+    fresh_box_.extend(record.position - reach), fresh_box_.extend(record.position + reach);
+  }
   counts_.seconds_fill += now() - begun;
 }
-
-bool Cache::answers_otherwise(const CachePoint& p) const { return has_fresh_ && covered(fresh_, p); }
 
 uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> which, Work& work) {
   std::atomic<uint64_t> rays{0};

@@ -31,6 +31,8 @@ struct CacheCounts {
   double seconds_lights = 0.0, seconds_update = 0.0, seconds_fill = 0.0;
 };
 
+struct PointGroup;
+
 /// How far the records are from fresh ones at the same places.
 struct Verification {
   double worst = 0.0;  // relative difference of irradiance
@@ -40,6 +42,8 @@ struct Verification {
 /// What a picture shows: light, which record answers, what became of it, how many rays that took, virtual lights.
 enum class View : uint8_t { kLight, kRecords, kChanges, kRays, kLights };
 
+/// Rather more than nothing, so that who was found covered is answered, whatever is rounded how.
+constexpr float kCoveringWeight = 1e-8f;
 constexpr float kAsItIs = 2.0f;  // an answer's weight: no light, a colour that is shown as it is
 
 /// Memory that threads use for one record after the other: a value for each light.
@@ -54,8 +58,8 @@ class Cache {
   void update(const CommittedScene&, const SceneChanges&, Work&);
   void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
   Answer answer(const CachePoint&) const;
-  /// Whether a record that the last fill() made may have a say in what answer() gave before it.
-  bool answers_otherwise(const CachePoint&) const;
+  /// For many: those without an answer, and those in whose a record that the last fill() made may have a say.
+  void answer(std::span<const CachePoint>, std::span<Answer>) const;
   /// A debug view's colour in place of light.
   Answer show(View, const CachePoint&) const;
   Verification verify(const CommittedScene&, Work&) const;
@@ -82,7 +86,10 @@ class Cache {
   /// Whether the record answered in the last frame or the one before: interrupted frames use few.
   bool was_used(uint32_t record) const { return update_ - used_[record] <= 2; }
   Rgb show_lights(const CachePoint&, float bounced) const;
-  bool covered(const Octree&, const CachePoint&) const;
+  void answer(const PointGroup&, std::vector<uint32_t>& near, std::span<Answer>) const;
+  bool covered(const CachePoint&) const;
+  /// A byte for each of the points that are asked for: whether no record covers it.
+  void find_open(std::span<const CachePoint>, std::span<const uint32_t> asked, uint8_t* open) const;
   bool insert(const CommittedScene&, const CachePoint&);
   /// Asks what is unknown of these records and sums their light anew.
   uint64_t resolve(const CommittedScene&, std::span<const uint32_t> records, Work&);
@@ -112,6 +119,7 @@ class Cache {
   VisibilityTable visibility_;
   Octree octree_, fresh_;  // all of them; those of the last fill()
   bool has_fresh_ = false;
+  Box fresh_box_;                        // where those of the last fill() reach
   mutable std::vector<uint32_t> used_;   // the update after which a record last answered
   mutable std::vector<uint8_t> wanted_;  // asked for while something of it was unknown
   uint32_t update_ = 0;

@@ -128,8 +128,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   }
   resolve(scene, dimmed, work);  // sums alone
   std::fill(wanted_.begin(), wanted_.end(), uint8_t(0));
-  if (!settings_.on_demand)
-    counts_.update_rays += resolve(scene, waiting, work), counts_.updated += waiting.size();
+  if (!settings_.on_demand) counts_.update_rays += resolve(scene, waiting, work), counts_.updated += waiting.size();
   has_fresh_ = false;
   counts_.seconds_update += now() - begun;
 }

@@ -57,9 +57,8 @@ class InstantCache final : public IndirectMethod {
   }
 
   void gather(const CommittedScene&, std::span<const CachePoint> points, std::span<Answer> answers) const override {
-    for (size_t i = 0; i < points.size(); ++i)
-      if (!(answers[i].weight > 0.0f) || cache_.answers_otherwise(points[i]))
-        answers[i] = view_ == View::kLight ? cache_.answer(points[i]) : cache_.show(view_, points[i]);
+    if (view_ == View::kLight) return cache_.answer(points, answers);
+    for (size_t i = 0; i < points.size(); ++i) answers[i] = cache_.show(view_, points[i]);
   }
 
   std::vector<char> save(const CommittedScene& scene) const override { return cache_.save(scene); }

@@ -8,8 +8,9 @@ namespace afterglow::instant_cache {
 
 namespace {
 
-constexpr float kFar = 1e18f;      // where unused lanes stand: its square is a number
-constexpr float kWider = 1.0001f;  // of a radius: against rounding
+constexpr float kFar = 1e18f;                       // where unused lanes stand: its square is a number
+constexpr uint32_t kUpper[3] = {0xaa, 0xcc, 0xf0};  // children on the upper side of each axis
+constexpr float kWider = 1.0001f;                   // of a radius: against rounding
 
 }  // namespace
 
@@ -26,7 +27,6 @@ void Octree::descend(uint32_t node, const Vec3& center, float half, const Vec3& 
   // Nodes from one to two radii wide: on a surface a record reaches into some ten of them.
   if (half < within || half < half_ * 0x1p-20f) return visit(nodes_[node]);
   uint32_t touched = 0xff;
-  constexpr uint32_t kUpper[3] = {0xaa, 0xcc, 0xf0};
   for (int axis = 0; axis < 3; ++axis) {
     if (position[axis] - within > center[axis]) touched &= kUpper[axis];
     if (position[axis] + within < center[axis]) touched &= ~kUpper[axis];
@@ -89,6 +89,52 @@ void Octree::set_radius(uint32_t index, const Record& record) {
   if (within_[index] == record.radius) return;
   descend(0, center_, half_, record.position, kWider * within_[index], [&](Node& node) { take(node, index); });
   insert(index, record, record.radius);
+}
+
+void Octree::find_near(const Box& box, float inverse_limit, uint32_t instance, std::vector<uint32_t>& found) const {
+  struct Visit {
+    uint32_t node;
+    float center[3], half;
+  };
+  found.clear();
+  Visit stack[8 * 24];
+  uint32_t waiting = 0;
+  stack[waiting++] = {0, {center_.x, center_.y, center_.z}, half_};
+  while (waiting) {
+    const Visit v = stack[--waiting];
+    const Node& node = nodes_[v.node];
+    for (const Block& block : node.blocks) {
+      uint8_t inside[kLanes];
+      for (uint32_t i = 0; i < kLanes; ++i) {
+        const float dx = std::max(std::max(box.lower.x - block.x[i], block.x[i] - box.upper.x), 0.0f);
+        const float dy = std::max(std::max(box.lower.y - block.y[i], block.y[i] - box.upper.y), 0.0f);
+        const float dz = std::max(std::max(box.lower.z - block.z[i], block.z[i] - box.upper.z), 0.0f);
+        const float inverse = std::max(block.inverse_radius[i], inverse_limit);
+        inside[i] = (dx * dx + dy * dy + dz * dz) * (inverse * inverse) < kWider;
+      }
+      uint64_t bytes;
+      std::memcpy(&bytes, inside, sizeof(bytes));
+      for (; bytes; bytes &= bytes - 1) {
+        const uint32_t record = block.record[std::countr_zero(bytes) / 8];
+        if (entries_[record].instance == instance) found.push_back(record);
+      }
+    }
+    uint32_t touched = 0xff;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(box.upper[axis] >= v.center[axis])) touched &= ~kUpper[axis];
+      if (!(box.lower[axis] < v.center[axis])) touched &= kUpper[axis];
+    }
+    const float half = 0.5f * v.half;
+    for (; touched; touched &= touched - 1) {
+      const uint32_t child = uint32_t(std::countr_zero(touched));
+      if (node.children[child] == kNone) continue;
+      stack[waiting] = {node.children[child], {v.center[0], v.center[1], v.center[2]}, half};
+      for (int axis = 0; axis < 3; ++axis) stack[waiting].center[axis] += child >> axis & 1 ? half : -half;
+      waiting++;
+    }
+  }
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
 }
 
 size_t Octree::bytes() const {

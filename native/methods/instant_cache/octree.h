@@ -58,6 +58,10 @@ class Octree {
       node = nodes_[node].children[child];
     }
   }
+  /// The records of one object whose radius, at most 1 / inverse_limit, holds any point of the box: in the order of
+  /// their numbers.
+  void find_near(const Box& box, float inverse_limit, uint32_t instance, std::vector<uint32_t>& found) const;
+  const Entry& entry(uint32_t record) const { return entries_[record]; }
   size_t bytes() const;
 
  private:
