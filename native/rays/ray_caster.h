@@ -53,6 +53,7 @@ class RayCaster {
 
  private:
   friend struct RayMeasurement;
+  friend class RaySubset;
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -265,14 +265,16 @@ void VirtualLightColumns::fill(std::vector<VirtualLight> from) {
   lights = std::move(from);
   count = uint32_t(lights.size());
   two_sided = false;
-  const size_t size = (size_t(count) + 7) / 8 * 8;
+  const size_t size = (size_t(count) + 15) / 16 * 16;
   lights.resize(size);
-  for (auto* column : {&x, &y, &z, &nx, &ny, &nz}) column->assign(size, 0.0f);
+  for (auto* column : {&x, &y, &z, &nx, &ny, &nz, &front[0], &front[1], &front[2], &back[0], &back[1], &back[2]})
+    column->assign(size, 0.0f);
   for (size_t i = 0; i < size; ++i) {
     const VirtualLight& l = lights[i];
     x[i] = l.position.x, y[i] = l.position.y, z[i] = l.position.z;
     if (l.black()) continue;  // no normal: no cosine, no light
     nx[i] = l.normal.x, ny[i] = l.normal.y, nz[i] = l.normal.z;
+    for (int c = 0; c < 3; ++c) front[c][i] = l.front[c], back[c][i] = l.back[c];
     two_sided |= !is_black(l.back);
   }
 }

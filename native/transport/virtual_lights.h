@@ -47,10 +47,11 @@ SlotPlan plan_slots(uint32_t count, uint32_t bounces);
 std::vector<VirtualLight> trace_virtual_lights(const WalkScene&, const LightEmission&, const VirtualLightOptions&,
                                                RayCounts&);
 
-/// The same lights, one array a value, so that a loop over them runs in vector registers. Padded to a multiple of 8
-/// with lights that never shine.
+/// The same lights, one array a value, so that a loop over them runs in vector registers. Padded to a multiple of
+/// 16 with lights that never shine.
 struct VirtualLightColumns {
   std::vector<float> x, y, z, nx, ny, nz;
+  std::vector<float> front[3], back[3];  // intensities of each colour
   std::vector<VirtualLight> lights;
   uint32_t count = 0;      // slots
   bool two_sided = false;  // any light shines backwards

@@ -6,7 +6,6 @@
 #include <atomic>
 #include <bit>
 #include <chrono>
-#include <cstring>
 
 #include "base/parallel.h"
 
@@ -14,11 +13,7 @@ namespace afterglow::instant_cache {
 
 namespace {
 
-using Eight = float __attribute__((vector_size(32)));  // the compiler splits it where registers are narrower
-
-constexpr float kSameLight = 0.02f;  // relative change of a record's light that leaves its radius as it is
-constexpr int kRadiusRounds = 5;     // three halves lead from the largest to the smallest
-constexpr size_t kRecordBlock = 4;   // 1024 rays or so
+constexpr size_t kRecordBlock = 4;  // 1024 rays or so
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -162,129 +157,29 @@ void Cache::ask(const WalkScene& walked, size_t index, float* terms, RayCounts& 
   const uint64_t rays_before = counts.shadow;
   geometry_terms(lights_, record.position, record.normal, bound_, terms);
   const Vec3 from = record.position + record.error * record.face_normal;
-  uint64_t* unknown = visibility_.unknown(index);
+  uint64_t *unknown = visibility_.unknown(index), *facing = visibility_.facing(index);
+  const bool few = moved_rays_ && index * visibility_.words() < only_moved_.size();
   for (uint32_t w = 0; w < visibility_.words(); ++w) {
+    const uint64_t quick = few ? only_moved_[index * visibility_.words() + w] : 0;
     for (uint64_t bits = unknown[w]; bits; bits &= bits - 1) {
+      const uint64_t bit = bits & -bits;
       const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
       const VirtualLight& light = lights_.lights[k];
       const float g = terms[k];
-      const bool shines = g > 0.0f ? front_[w] >> (k % 64) & 1 : g < 0.0f && (back_[w] >> (k % 64) & 1);
+      const bool shines = g > 0.0f ? front_[w] & bit : g < 0.0f && (back_[w] & bit);
       const bool asks = shines && can_see(record.position, record.face_normal, light, g > 0.0f);
-      visibility_.set(index, k, asks ? visibility(walked, visibility_ray(from, light), counts) : Rgb(0.0f));
+      facing[w] = asks ? facing[w] | bit : facing[w] & ~bit;
+      if (asks && (quick & bit)) {  // was seen, and nothing else can hide it
+        counts.shadow++;
+        if (moved_rays_->occluded(visibility_ray(from, light))) visibility_.set(index, k, Rgb(0.0f));
+      } else {
+        visibility_.set(index, k, asks ? visibility(walked, visibility_ray(from, light), counts) : Rgb(0.0f));
+      }
     }
     unknown[w] = 0;
   }
   record.rays = uint32_t(counts.shadow - rays_before);
   if (record.rays) record.asked = update_;
-}
-
-/// Terms: geometry_terms() of a place at or near the record's.
-Rgb Cache::irradiance(size_t row, const float* terms) const {
-  const uint64_t* seen = visibility_.seen(row);
-  Rgb sum(0.0f);
-  for (uint32_t w = 0; w < visibility_.words(); ++w)
-    for (uint64_t bits = seen[w]; bits; bits &= bits - 1) {
-      const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
-      const float g = terms[k];
-      if (g == 0.0f) continue;
-      const Rgb light = std::fabs(g) * (g > 0.0f ? lights_.lights[k].front : lights_.lights[k].back);
-      sum += visibility_.coloured() ? light * visibility_.get(row, k) : light;
-    }
-  return is_finite(sum) ? sum : Rgb(0.0f);
-}
-
-/// Exact for the lights that are seen; what comes into sight or leaves it nearby is left aside.
-void Cache::find_gradients(size_t index, Sums& sums) {
-  Record& record = records_[index];
-  const Frame frame(record.normal);
-  GeometrySlopes& slopes = sums.slopes;
-  geometry_slopes(lights_, record.position, frame, bound_, slopes);
-  const uint64_t* seen = visibility_.seen(index);
-  Rgb step_t(0.0f), step_b(0.0f), turn_t(0.0f), turn_b(0.0f);
-  for (uint32_t w = 0; w < visibility_.words(); ++w)
-    for (uint64_t bits = seen[w]; bits; bits &= bits - 1) {
-      const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
-      const float g = sums.terms[k];
-      if (g == 0.0f) continue;
-      Rgb light = g > 0.0f ? lights_.lights[k].front : -lights_.lights[k].back;
-      if (visibility_.coloured()) light *= visibility_.get(index, k);
-      step_t += slopes.step_t[k] * light, step_b += slopes.step_b[k] * light;
-      turn_t += slopes.turn_t[k] * light, turn_b += slopes.turn_b[k] * light;
-    }
-  const bool sound = is_finite(step_t) && is_finite(step_b) && is_finite(turn_t) && is_finite(turn_b);
-  const glm::mat3 none(0.0f);
-  record.by_step = sound ? glm::outerProduct(step_t, frame.t) + glm::outerProduct(step_b, frame.b) : none;
-  record.by_turn = sound ? glm::outerProduct(turn_t, frame.t) + glm::outerProduct(turn_b, frame.b) : none;
-}
-
-void Cache::sum(size_t index, Sums& sums) {
-  Record& record = records_[index];
-  record.irradiance = irradiance(index, sums.terms.data());
-  find_gradients(index, sums);
-  const float here = luminance(record.irradiance);
-  record.ready = true;
-  if (std::fabs(here - record.measured) <= kSameLight * record.measured) return;
-  record.radius = find_radius(index, sums);
-  record.measured = here;
-}
-
-/// As far as the gradient tells the truth, to a tolerance, in four directions: it ends where light bends, as before
-/// corners, to which a slope at the record alone is blind. Shadows are left aside.
-float Cache::find_radius(size_t index, Sums& sums) const {
-  const Record& record = records_[index];
-  const float here = luminance(record.irradiance), least = spacing_.least_pixels * record.footprint;
-  if (!(here > 0.0f)) return record.reach;
-  const uint32_t size = lights_.padded();
-  const bool two_sided = lights_.two_sided;
-  sums.front.assign(size, 0.0f), sums.back.assign(size, 0.0f);
-  for (uint32_t w = 0; w < visibility_.words(); ++w)
-    for (uint64_t bits = visibility_.seen(index)[w]; bits; bits &= bits - 1) {
-      const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
-      const Rgb share = visibility_.coloured() ? visibility_.get(index, k) : Rgb(1.0f);
-      sums.front[k] = luminance(share * lights_.lights[k].front);
-      if (two_sided) sums.back[k] = luminance(share * lights_.lights[k].back);
-    }
-  const auto light_there = [&](const Vec3& offset) {
-    geometry_terms(lights_, record.position + offset, record.normal, bound_, sums.terms.data());
-    const auto eight = [](const std::vector<float>& from, uint32_t i) {
-      Eight values;
-      std::memcpy(&values, from.data() + i, sizeof(values));
-      return values;
-    };
-    const Eight none = {};
-    Eight sum = none;
-    for (uint32_t i = 0; i < size; i += 8) {
-      const Eight g = eight(sums.terms, i);
-      if (two_sided)
-        sum += (g > 0.0f ? g : none) * eight(sums.front, i) - (g < 0.0f ? g : none) * eight(sums.back, i);
-      else
-        sum += g * eight(sums.front, i);
-    }
-    return ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
-  };
-  const Frame frame(record.normal);
-  const float bend = spacing_.bend;
-  const auto off_line = [&](float radius) {
-    float worst = 0.0f;
-    for (const Vec3& way : {frame.t, -frame.t, frame.b, -frame.b}) {
-      if (worst >= 4.0f * bend) break;  // enough to halve the radius
-      const Rgb line = record.irradiance + radius * (record.by_step * way);
-      const float told = luminance(bounded_light(line, record.irradiance));
-      worst = std::max(worst, std::fabs(light_there(radius * way) - told) / here);
-    }
-    return worst;
-  };
-  if (record.measured >= 0.0f) {  // other light, mostly as bent as it was
-    const float off = off_line(record.radius);
-    if (off > bend ? record.radius <= least : off > 0.25f * bend || record.radius >= record.reach) return record.radius;
-  }
-  float radius = record.reach;
-  for (int round = 0; round < kRadiusRounds && radius > least; ++round) {
-    const float off = off_line(radius);
-    if (off <= bend) break;
-    radius *= std::clamp(std::sqrt(bend / off), 0.5f, 0.8f);  // it is of second order
-  }
-  return std::min(std::max(radius, least), record.reach);
 }
 
 Verification Cache::verify(const CommittedScene& scene, Work& work) const {

@@ -4,6 +4,7 @@
 // interrupts this, what is unknown stays marked.
 #pragma once
 
+#include <memory>
 #include <mutex>
 #include <span>
 
@@ -11,6 +12,7 @@
 #include "methods/instant_cache/moved.h"
 #include "methods/virtual_light_settings.h"
 #include "methods/walk_settings.h"
+#include "rays/ray_subset.h"
 
 namespace afterglow::instant_cache {
 
@@ -48,7 +50,8 @@ constexpr float kAsItIs = 2.0f;  // an answer's weight: no light, a colour that 
 
 /// Memory that threads use for one record after the other: a value for each light.
 struct Sums {
-  std::vector<float> terms, front, back;  // geometry_terms(); luminance that arrives from either side of what is seen
+  std::vector<float> terms, light[3];  // geometry_terms(); what is seen of each colour of light
+  std::vector<float> front, back;      // luminance that arrives from either side of what is seen
   GeometrySlopes slopes;
 };
 
@@ -76,6 +79,8 @@ class Cache {
   void trace_lights(const CommittedScene&, Work&, std::vector<uint64_t>& moved_slots, bool& recoloured);
   void follow(const CommittedScene&, const std::vector<Moved>&);
   void mark_crossings(const std::vector<Moved>&, Work&);
+  void prepare_moved_rays(const CommittedScene&, const std::vector<Moved>&);
+  void mark_hidden(size_t record);
   void mark(size_t record, const std::vector<uint64_t>& slots);
   /// Whether the last frame was interrupted, told from how many records it asked.
   void look_back();
@@ -96,8 +101,9 @@ class Cache {
   void ask(const WalkScene&, size_t record, float* terms, RayCounts&);
   void sum(size_t record, Sums&);
   void find_gradients(size_t record, Sums&);
+  void find_light(size_t record, Sums&) const;
+  void find_brightness(size_t record, Sums&) const;
   float find_radius(size_t record, Sums&) const;
-  Rgb irradiance(size_t row, const float* terms) const;
   WalkScene walk(const CommittedScene& scene) const {
     return {scene, settings_.walk.limits, shown_.empty() ? nullptr : &shown_, false};
   }
@@ -117,7 +123,9 @@ class Cache {
 
   std::vector<Record> records_;
   VisibilityTable visibility_;
-  Octree octree_, fresh_;  // all of them; those of the last fill()
+  std::vector<uint64_t> only_moved_;       // bits of records: was seen, and only what just moved can hide it
+  std::unique_ptr<RaySubset> moved_rays_;  // through what just moved; both for the last update alone
+  Octree octree_, fresh_;                  // all of them; those of the last fill()
   bool has_fresh_ = false;
   Box fresh_box_;                        // where those of the last fill() reach
   mutable std::vector<uint32_t> used_;   // the update after which a record last answered

@@ -73,6 +73,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   stale_ |= changes.everything || changes.origin || shown != shown_;
   // Another ball around the scene: all sums are made anew, and the lights whose paths begin on it move. Visibility
   // stays.
+  const bool other_bound = bound != bound_;
   const bool scaled = center != center_ || radius != radius_ || bound != bound_;
   shown_ = shown, center_ = center, radius_ = radius, bound_ = bound;
   look_back();
@@ -106,6 +107,8 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   const std::vector<Moved> moved = placement_.update(scene, changes);
   counts_.objects_moved = uint32_t(moved.size());
   follow(scene, moved);
+  if (other_bound)  // what the bound hid may show
+    for (size_t i = 0; i < records_.size(); ++i) mark_hidden(i);
   if (std::any_of(moved_slots.begin(), moved_slots.end(), [](uint64_t w) { return w != 0; }))
     for (size_t i = 0; i < records_.size(); ++i) mark(i, moved_slots);
   mark_crossings(moved, work);
@@ -128,7 +131,12 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   }
   resolve(scene, dimmed, work);  // sums alone
   std::fill(wanted_.begin(), wanted_.end(), uint8_t(0));
-  if (!settings_.on_demand) counts_.update_rays += resolve(scene, waiting, work), counts_.updated += waiting.size();
+  if (!settings_.on_demand) {
+    prepare_moved_rays(scene, moved);
+    counts_.update_rays += resolve(scene, waiting, work), counts_.updated += waiting.size();
+    moved_rays_.reset();
+  }
+  only_moved_.clear();
   has_fresh_ = false;
   counts_.seconds_update += now() - begun;
 }
@@ -176,8 +184,7 @@ void Cache::follow(const CommittedScene& scene, const std::vector<Moved>& moved)
     by_instance[m.instance] = &m;
   }
   if (!any) return;
-  std::vector<uint32_t> kept;
-  bool changed = false;
+  std::vector<uint32_t> kept, follows;
   for (uint32_t i = 0; i < records_.size(); ++i) {
     Record& record = records_[i];
     const Moved* m = record.place.instance < by_instance.size() ? by_instance[record.place.instance] : nullptr;
@@ -185,19 +192,39 @@ void Cache::follow(const CommittedScene& scene, const std::vector<Moved>& moved)
       kept.push_back(i);
       continue;
     }
-    changed = true;
     if (!m->keeps_places || !m->after.present() || !locate(scene.scene, record)) {
       counts_.dropped++;
       continue;
     }
     counts_.moved++;
+    follows.push_back(i);
     uint64_t* unknown = visibility_.unknown(i);
     std::fill_n(unknown, visibility_.words(), ~uint64_t(0));
     if (lights_.count % 64) unknown[visibility_.words() - 1] = (uint64_t(1) << (lights_.count % 64)) - 1;
     kept.push_back(i);
   }
-  if (kept.size() != records_.size()) keep(kept);
-  if (changed) rebuild_octree();
+  if (kept.size() != records_.size() || follows.size() > records_.size() / 2) {
+    keep(kept);
+    rebuild_octree();
+  } else {
+    for (const uint32_t i : follows) octree_.move(i, records_[i]);
+  }
+}
+
+/// Rays that were seen and are marked because of what just moved need nothing else.
+void Cache::prepare_moved_rays(const CommittedScene& scene, const std::vector<Moved>& moved) {
+  if (only_moved_.empty()) return;
+  std::vector<uint32_t> there;
+  for (const Moved& m : moved)
+    if (m.after.present()) there.push_back(m.instance);
+  moved_rays_ = std::make_unique<RaySubset>(scene.rays, there);
+  if (!moved_rays_->complete()) moved_rays_.reset();
+}
+
+void Cache::mark_hidden(size_t record) {
+  const uint64_t* facing = visibility_.facing(record);
+  for (uint32_t k = 0; k < lights_.count; ++k)
+    if (!(facing[k / 64] >> (k % 64) & 1)) visibility_.unknown(record)[k / 64] |= uint64_t(1) << (k % 64);
 }
 
 void Cache::mark(size_t record, const std::vector<uint64_t>& slots) {
@@ -208,6 +235,7 @@ void Cache::mark(size_t record, const std::vector<uint64_t>& slots) {
 /// Cases 3 and 4. Groups of records near each other are tested against each object first, then each record against the
 /// object's own box, then what is known tells whether a ray has to be traced.
 void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
+  only_moved_.clear();
   if (moved.empty() || records_.empty() || !lights_.count) return;
   if (moved.size() > kManyObjects) {
     const std::vector<uint64_t> all(visibility_.words(), ~uint64_t(0));
@@ -223,47 +251,45 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
     order[i] = {spread_bits(uint64_t(at.x)) | spread_bits(uint64_t(at.y)) << 1 | spread_bits(uint64_t(at.z)) << 2, i};
   }
   std::sort(order.begin(), order.end());
-  const float *x = lights_.x.data(), *y = lights_.y.data(), *z = lights_.z.data();
-  const uint32_t words = visibility_.words(), count = lights_.count;
+  const uint32_t words = visibility_.words();
   // Rays begin and end a little above the faces: all boxes are taken as much larger.
-  float lift = 0.0f;
+  float lift = 0.0f, error = 0.0f;
   for (const VirtualLight& light : lights_.lights) lift = std::max(lift, light.lift);
+  for (const Record& record : records_) error = std::max(error, record.error);
+  struct Place {
+    Crossing crossing;
+    bool old;
+  };
+  std::vector<Place> places;
+  for (const Moved& m : moved)
+    for (const bool old : {true, false})
+      if (const Bounds& bounds = old ? m.before : m.after; bounds.present())
+        places.push_back({Crossing(bounds, 2.0f * (lift + error), lights_), old});
+  only_moved_.assign(visibility_.coloured() ? 0 : records_.size() * words, 0);
   parallel_blocks(order.size(), kGroup, work.threads, [&](size_t begin, size_t end) {
     Box around;
-    float error = 0.0f;
-    for (size_t i = begin; i < end; ++i) {
-      const Record& record = records_[order[i].second];
-      around.extend(record.position);
-      error = std::max(error, record.error);
-    }
-    const float slack = 2.0f * (lift + error);
-    const auto larger = [&](const Box& box) { return Box{box.lower - slack, box.upper + slack}; };
-    std::vector<uint64_t> before(words), after(words), crosses(words);
-    for (const Moved& m : moved) {
-      const bool was = m.before.present(), is = m.after.present();
-      std::fill(before.begin(), before.end(), 0), std::fill(after.begin(), after.end(), 0);
-      if (was) crossing_from_box(larger(m.before.world), around, x, y, z, count, before.data());
-      if (is) crossing_from_box(larger(m.after.world), around, x, y, z, count, after.data());
-      const auto any = [](const std::vector<uint64_t>& bits) {
-        return std::any_of(bits.begin(), bits.end(), [](uint64_t w) { return w != 0; });
-      };
-      const bool any_before = any(before), any_after = any(after);
-      if (!any_before && !any_after) continue;
+    for (size_t i = begin; i < end; ++i) around.extend(records_[order[i].second].position);
+    std::vector<uint64_t> bits(words * 4);
+    uint64_t *darker = bits.data(), *brighter = darker + words, *near = brighter + words, *crosses = near + words;
+    for (size_t i = begin; i < end; ++i)
+      for (uint32_t w = 0; w < words; ++w) {
+        const size_t row = order[i].second;
+        darker[w] |= visibility_.could_darken(row, w), brighter[w] |= visibility_.could_brighten(row, w);
+      }
+    for (const Place& place : places) {
+      if (!place.crossing.box(around.center(), 0.5f * around.size(), place.old ? brighter : darker, near)) continue;
       for (size_t i = begin; i < end; ++i) {
-        const uint32_t index = order[i].second;
-        uint64_t* unknown = visibility_.unknown(index);
-        const Vec3& from = records_[index].position;
-        for (const bool old : {false, true}) {
-          if (old ? !any_before : !any_after) continue;
-          crossing(old ? m.before : m.after, from, slack, x, y, z, count, crosses.data());
-          for (uint32_t w = 0; w < words; ++w)
-            for (uint64_t bits = crosses[w] & (old ? before[w] : after[w]) & (front_[w] | back_[w]) & ~unknown[w]; bits;
-                 bits &= bits - 1) {
-              const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
-              if ((old ? visibility_.could_brighten(index, k) : visibility_.could_darken(index, k)) &&
-                  crosses_parts(old ? m.before : m.after, from, lights_.lights[k].position, slack))
-                unknown[w] |= uint64_t(1) << (k % 64);
-            }
+        const size_t row = order[i].second;
+        uint64_t* unknown = visibility_.unknown(row);
+        for (uint32_t w = 0; w < words; ++w)
+          crosses[w] = near[w] & ~unknown[w] &
+                       (place.old ? visibility_.could_brighten(row, w) : visibility_.could_darken(row, w));
+        const Vec3& from = records_[row].position;
+        if (!place.crossing.box(from, Vec3(0.0f), crosses, crosses)) continue;
+        place.crossing.parts(from, crosses);
+        for (uint32_t w = 0; w < words; ++w) {
+          unknown[w] |= crosses[w];
+          if (!place.old && !only_moved_.empty()) only_moved_[row * words + w] |= crosses[w];
         }
       }
     }

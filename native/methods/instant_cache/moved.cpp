@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What moved, and the tests that spare rays: see moved.h. The slab test with an interval of origins is conservative: a
-// ray that it rejects meets the box from nowhere within the interval.
+// What moved, and the tests that spare rays: see moved.h. A way from anywhere near a point stays within that distance
+// of the way from the point: the box is taken as much larger.
 #include "methods/instant_cache/moved.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
 
 namespace afterglow::instant_cache {
 
 namespace {
 
 constexpr uint32_t kMostParts = 64;  // of a mesh
-constexpr float kFar = 1e37f;        // where boxes stand that no ray meets
+constexpr float kFar = 1e18f;        // where boxes stand that no ray meets
+constexpr float kRounding = 1e-6f;   // of lengths and of their products
 
 bool same(const Affine& a, const Affine& b) { return a.x == b.x && a.y == b.y && a.z == b.z && a.p == b.p; }
 
@@ -42,13 +45,13 @@ std::shared_ptr<const Parts> parts_of(const Mesh& mesh) {
   if (boxes.size() < 2) return nullptr;
   auto parts = std::make_shared<Parts>();
   for (int axis = 0; axis < 3; ++axis) {
-    parts->lower[axis].assign((boxes.size() + 7) / 8 * 8, kFar);
-    parts->upper[axis].assign(parts->lower[axis].size(), kFar);
+    parts->middle[axis].assign((boxes.size() + 15) / 16 * 16, kFar);
+    parts->half[axis].assign(parts->middle[axis].size(), 0.0f);
   }
   for (size_t i = 0; i < boxes.size(); ++i) {
     const Box box = widened(boxes[i], 2e-5f, 1e-5f * max_component(size));
     for (int axis = 0; axis < 3; ++axis)
-      parts->lower[axis][i] = box.lower[axis], parts->upper[axis][i] = box.upper[axis];
+      parts->middle[axis][i] = box.center()[axis], parts->half[axis][i] = 0.5f * box.size()[axis];
   }
   return parts;
 }
@@ -129,94 +132,97 @@ std::vector<Moved> Placement::update(const CommittedScene& committed, const Scen
   return moved;
 }
 
-void crossing(const Bounds& bounds, const Vec3& from, float slack, const float* x, const float* y, const float* z,
-              uint32_t count, uint64_t* bits) {
-  const Vec3 o = bounds.to_object.point(from);
-  const Affine& m = bounds.to_object;
-  const Box& b = bounds.box;
-  const Vec3 reach = slack * (glm::abs(m.x) + glm::abs(m.y) + glm::abs(m.z));
-  const Vec3 below = b.lower - reach - o, above = b.upper + reach - o;
-  for (uint32_t first = 0; first < count; first += 64) {
-    const uint32_t here = std::min(count - first, 64u);
-    uint8_t hits[64];
-    for (uint32_t k = 0; k < here; ++k) {
-      const float dx = x[first + k] - from.x, dy = y[first + k] - from.y, dz = z[first + k] - from.z;
-      float enter = 0.0f, leave = 1.0f;
-      for (int axis = 0; axis < 3; ++axis) {
-        float d = m.x[axis] * dx + m.y[axis] * dy + m.z[axis] * dz;
-        d = std::fabs(d) < 1e-30f ? 1e-30f : d;
-        const float inverse = 1.0f / d;
-        const float t0 = below[axis] * inverse, t1 = above[axis] * inverse;
-        enter = std::max(enter, std::min(t0, t1));
-        leave = std::min(leave, std::max(t0, t1));
-      }
-      hits[k] = enter <= leave * (1.0f + 1e-5f) + 1e-6f;
-    }
-    uint64_t word = 0;
-    for (uint32_t k = 0; k < here; ++k) word |= uint64_t(hits[k]) << k;
-    bits[first / 64] = word;
+Crossing::Crossing(const Bounds& bounds, float slack, const VirtualLightColumns& lights)
+    : to_object_(bounds.to_object),
+      parts_(bounds.parts.get()),
+      middle_(bounds.box.center()),
+      words_((lights.count + 63) / 64) {
+  const Affine& m = to_object_;
+  const Vec3 stretch = glm::abs(m.x) + glm::abs(m.y) + glm::abs(m.z);
+  reach_ = slack * stretch + kRounding * glm::abs(m.p);
+  half_ = 0.5f * bounds.box.size() + reach_;
+  to_object_.p -= middle_;
+  for (auto* column : {&x_, &y_, &z_}) column->assign(size_t(words_) * 64, 0.0f);
+  for (uint32_t k = 0; k < lights.count; ++k) {
+    const Vec3 at = to_object_.point(Vec3(lights.x[k], lights.y[k], lights.z[k]));
+    x_[k] = at.x, y_[k] = at.y, z_[k] = at.z;
+    far_ = std::max(far_, max_component(glm::abs(at)));
   }
 }
 
-bool crosses_parts(const Bounds& bounds, const Vec3& from, const Vec3& to, float slack) {
-  if (!bounds.parts) return true;
-  const Affine& m = bounds.to_object;
-  const Vec3 o = m.point(from), end = m.point(to);
-  const Vec3 reach = slack * (glm::abs(m.x) + glm::abs(m.y) + glm::abs(m.z));
-  Vec3 inverse;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float d = end[axis] - o[axis];
-    inverse[axis] = 1.0f / (std::fabs(d) < 1e-30f ? 1e-30f : d);
+float Crossing::rounding(const Vec3& from) const {
+  const float size = max_component(half_);
+  return kRounding * (max_component(glm::abs(from)) + size) * (far_ + size);
+}
+
+bool Crossing::box(const Vec3& from, const Vec3& spread, const uint64_t* among, uint64_t* crosses) const {
+  const Affine& m = to_object_;
+  const Vec3 o = m.point(from);
+  const Vec3 e =
+      half_ + glm::abs(m.x) * spread.x + glm::abs(m.y) * spread.y + glm::abs(m.z) * spread.z + kRounding * glm::abs(o);
+  const Vec3 twice = 2.0f * e;
+  const float rest = rounding(o);
+  uint64_t any = 0;
+  for (uint32_t w = 0; w < words_; ++w) {
+    const uint64_t asked = among[w];  // may be the same memory
+    crosses[w] = 0;
+    if (!asked) continue;
+    const float *x = x_.data() + 64 * w, *y = y_.data() + 64 * w, *z = z_.data() + 64 * w;
+    uint8_t hits[64];
+    for (int k = 0; k < 64; ++k) {
+      const float dx = std::fabs(x[k] - o.x), dy = std::fabs(y[k] - o.y), dz = std::fabs(z[k] - o.z);
+      const float sx = std::fabs(x[k] + o.x), sy = std::fabs(y[k] + o.y), sz = std::fabs(z[k] + o.z);
+      const float cx = std::fabs(o.y * z[k] - o.z * y[k]), cy = std::fabs(o.z * x[k] - o.x * z[k]),
+                  cz = std::fabs(o.x * y[k] - o.y * x[k]);
+      // Not a number: it may.
+      hits[k] = uint8_t(!(sx > twice.x + dx) & !(sy > twice.y + dy) & !(sz > twice.z + dz) &
+                        !(cx > e.y * dz + e.z * dy + rest) & !(cy > e.z * dx + e.x * dz + rest) &
+                        !(cz > e.x * dy + e.y * dx + rest));
+    }
+    for (int k = 0; k < 64; k += 8) {
+      uint64_t bytes;
+      std::memcpy(&bytes, hits + k, 8);
+      crosses[w] |= (bytes * 0x0102040810204080ull >> 56) << k;  // a bit a byte
+    }
+    crosses[w] &= asked;
+    any |= crosses[w];
   }
-  const Parts& p = *bounds.parts;
-  const float *lx = p.lower[0].data(), *ly = p.lower[1].data(), *lz = p.lower[2].data();
-  const float *ux = p.upper[0].data(), *uy = p.upper[1].data(), *uz = p.upper[2].data();
-  const size_t count = p.lower[0].size();
-  for (size_t first = 0; first < count; first += 8) {
+  return any != 0;
+}
+
+void Crossing::parts(const Vec3& from, uint64_t* crosses) const {
+  if (!parts_) return;
+  const Vec3 o = to_object_.point(from);
+  const float rest = rounding(o);
+  for (uint32_t w = 0; w < words_; ++w)
+    for (uint64_t bits = crosses[w]; bits; bits &= bits - 1) {
+      const uint32_t k = 64 * w + uint32_t(std::countr_zero(bits));
+      if (!meets_part(o, Vec3(x_[k], y_[k], z_[k]), rest)) crosses[w] &= ~(bits & -bits);
+    }
+}
+
+bool Crossing::meets_part(const Vec3& from, const Vec3& to, float rest) const {
+  const Parts& p = *parts_;
+  const float *mx = p.middle[0].data(), *my = p.middle[1].data(), *mz = p.middle[2].data();
+  const float *hx = p.half[0].data(), *hy = p.half[1].data(), *hz = p.half[2].data();
+  const Vec3 way = to - from, d = glm::abs(way), sum = from + to + 2.0f * middle_;
+  const Vec3 reach = reach_ + kRounding * (glm::abs(from) + far_);
+  // Around the middle of the way: its cross product with the way is that of one end, too.
+  const Vec3 a = 0.5f * sum;
+  for (size_t first = 0; first < p.half[0].size(); first += 16) {
     uint32_t any = 0;
-    for (size_t i = first; i < first + 8; ++i) {
-      const float x0 = (lx[i] - reach.x - o.x) * inverse.x, x1 = (ux[i] + reach.x - o.x) * inverse.x;
-      const float y0 = (ly[i] - reach.y - o.y) * inverse.y, y1 = (uy[i] + reach.y - o.y) * inverse.y;
-      const float z0 = (lz[i] - reach.z - o.z) * inverse.z, z1 = (uz[i] + reach.z - o.z) * inverse.z;
-      const float enter = std::max(std::max(std::min(x0, x1), std::min(y0, y1)), std::max(std::min(z0, z1), 0.0f));
-      const float leave = std::min(std::min(std::max(x0, x1), std::max(y0, y1)), std::min(std::max(z0, z1), 1.0f));
-      any |= uint32_t(enter <= leave * (1.0f + 1e-5f) + 1e-6f);
+    for (size_t i = first; i < first + 16; ++i) {
+      const float ax = a.x - mx[i], ay = a.y - my[i], az = a.z - mz[i];
+      const float ex = hx[i] + reach.x, ey = hy[i] + reach.y, ez = hz[i] + reach.z;
+      const float cx = std::fabs(ay * way.z - az * way.y), cy = std::fabs(az * way.x - ax * way.z),
+                  cz = std::fabs(ax * way.y - ay * way.x);
+      any |= uint32_t(!(std::fabs(ax) > ex + 0.5f * d.x) & !(std::fabs(ay) > ey + 0.5f * d.y) &
+                      !(std::fabs(az) > ez + 0.5f * d.z) & !(cx > ey * d.z + ez * d.y + rest) &
+                      !(cy > ez * d.x + ex * d.z + rest) & !(cz > ex * d.y + ey * d.x + rest));
     }
     if (any) return true;
   }
   return false;
-}
-
-void crossing_from_box(const Box& moved, const Box& from, const float* x, const float* y, const float* z,
-                       uint32_t count, uint64_t* bits) {
-  for (uint32_t first = 0; first < count; first += 64) {
-    const uint32_t here = std::min(count - first, 64u);
-    uint64_t word = 0;
-    for (uint32_t k = 0; k < here; ++k) {
-      const Vec3 light(x[first + k], y[first + k], z[first + k]);
-      // At s the ways fill the box from (1 − s) from + s light: it must meet `moved` on every axis at once.
-      float enter = 0.0f, leave = 1.0f;
-      for (int axis = 0; axis < 3; ++axis) {
-        const float low_slope = light[axis] - from.lower[axis], low = moved.upper[axis] - from.lower[axis];
-        const float high_slope = light[axis] - from.upper[axis], high = moved.lower[axis] - from.upper[axis];
-        // lower(s) = from.lower + s low_slope ≤ moved.upper; upper(s) = from.upper + s high_slope ≥ moved.lower
-        if (low_slope > 0.0f)
-          leave = std::min(leave, low / low_slope);
-        else if (low_slope < 0.0f)
-          enter = std::max(enter, low / low_slope);
-        else if (low < 0.0f)
-          leave = -1.0f;
-        if (high_slope < 0.0f)
-          leave = std::min(leave, high / high_slope);
-        else if (high_slope > 0.0f)
-          enter = std::max(enter, high / high_slope);
-        else if (high > 0.0f)
-          leave = -1.0f;
-      }
-      word |= uint64_t(enter <= leave * (1.0f + 1e-5f) + 1e-6f) << k;
-    }
-    bits[first / 64] = word;
-  }
 }
 
 }  // namespace afterglow::instant_cache

@@ -8,12 +8,13 @@
 #include <unordered_map>
 
 #include "transport/committed_scene.h"
+#include "transport/virtual_lights.h"
 
 namespace afterglow::instant_cache {
 
-/// Boxes around the parts of a mesh, in its own space, a column for each plane, padded to a multiple of eight.
+/// Boxes around the parts of a mesh, in its own space: middles and half sizes, padded to a multiple of 16.
 struct Parts {
-  std::vector<float> lower[3], upper[3];
+  std::vector<float> middle[3], half[3];
 };
 
 /// A box in an object's space. Empty: the object was not there.
@@ -50,16 +51,30 @@ class Placement {
   std::vector<Object> objects_;
 };
 
-/// One bit a light: whether the way from the point to it may cross the box. Light positions in world space. slack: how
-/// far from both ends, in world space, the ray may really begin and end.
-void crossing(const Bounds&, const Vec3& from, float slack, const float* x, const float* y, const float* z,
-              uint32_t count, uint64_t* bits);
+/// Which ways to lights may cross an object as it stood or stands. The lights' places are taken into its space once.
+/// The segment test has no division (separating axes of box and segment; Gottschalk et al. 1996), and its roundings are
+/// allowed for.
+class Crossing {
+ public:
+  /// slack: how far from both ends, in world space, the ray may really begin and end.
+  Crossing(const Bounds&, float slack, const VirtualLightColumns&);
+  /// One bit a light, of those `among`: whether any way from the points within `spread` of `from` may cross the box.
+  /// False: none.
+  bool box(const Vec3& from, const Vec3& spread, const uint64_t* among, uint64_t* crosses) const;
+  /// Of those bits, clears the ones whose way from the point itself misses every part; without parts all stay.
+  void parts(const Vec3& from, uint64_t* crosses) const;
 
-/// Whether the way from the point to another may cross a part of the object; true where it has none.
-bool crosses_parts(const Bounds&, const Vec3& from, const Vec3& to, float slack);
+ private:
+  bool meets_part(const Vec3& from, const Vec3& to, float rounding) const;
+  float rounding(const Vec3& from) const;
 
-/// One bit a light: whether any way from the box `from` to it may cross the box `moved`, in world space.
-void crossing_from_box(const Box& moved, const Box& from, const float* x, const float* y, const float* z,
-                       uint32_t count, uint64_t* bits);
+  Affine to_object_;  // its middle is the origin
+  Vec3 half_, reach_;
+  const Parts* parts_;
+  Vec3 middle_;
+  float far_ = 0.0f;  // of the lights from the middle
+  uint32_t words_;
+  std::vector<float> x_, y_, z_;
+};
 
 }  // namespace afterglow::instant_cache

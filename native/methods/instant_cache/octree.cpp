@@ -91,6 +91,12 @@ void Octree::set_radius(uint32_t index, const Record& record) {
   insert(index, record, record.radius);
 }
 
+void Octree::move(uint32_t index, const Record& record) {
+  const Vec3 before = entries_[index].position;
+  descend(0, center_, half_, before, kWider * within_[index], [&](Node& node) { take(node, index); });
+  insert(index, record, record.radius);
+}
+
 void Octree::find_near(const Box& box, float inverse_limit, uint32_t instance, std::vector<uint32_t>& found) const {
   struct Visit {
     uint32_t node;

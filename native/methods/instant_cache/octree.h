@@ -28,6 +28,8 @@ class Octree {
   void insert(uint32_t index, const Record&, float within);
   /// A record's radius became another, and it is to be found within that.
   void set_radius(uint32_t index, const Record&);
+  /// A record stands elsewhere.
+  void move(uint32_t index, const Record&);
 
   /// Calls visit(const Entry&) for the records whose radius, at most 1 / inverse_limit, holds the position; it returns
   /// false to end the search.

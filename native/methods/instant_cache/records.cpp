@@ -3,6 +3,7 @@
 #include "methods/instant_cache/records.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 #include "rays/surface_point.h"
@@ -55,7 +56,7 @@ Rgb unpack_transmittance(uint16_t packed) {
 void VisibilityTable::reset(uint32_t slots, bool coloured) {
   slots_ = slots, words_ = (slots + 63) / 64, coloured_ = coloured;
   rows_ = 0;
-  seen_.clear(), unknown_.clear(), transmittance_.clear();
+  seen_.clear(), unknown_.clear(), facing_.clear(), transmittance_.clear();
 }
 
 void VisibilityTable::set_coloured(bool coloured) {
@@ -77,6 +78,7 @@ void VisibilityTable::set_coloured(bool coloured) {
 void VisibilityTable::add_row() {
   rows_++;
   seen_.resize(rows_ * words_, 0);
+  facing_.resize(rows_ * words_, ~uint64_t(0));
   unknown_.resize(rows_ * words_, ~uint64_t(0));
   if (slots_ % 64 && words_) unknown_.back() = (uint64_t(1) << (slots_ % 64)) - 1;
   if (coloured_) transmittance_.resize(rows_ * slots_, 0);
@@ -88,10 +90,11 @@ void VisibilityTable::keep(const std::vector<uint32_t>& kept) {
     if (from == to) continue;
     std::copy_n(seen(from), words_, seen(to));
     std::copy_n(unknown(from), words_, unknown(to));
+    std::copy_n(facing(from), words_, facing(to));
     if (coloured_) std::copy_n(transmittance_.data() + from * slots_, slots_, transmittance_.data() + to * slots_);
   }
   rows_ = kept.size();
-  seen_.resize(rows_ * words_), unknown_.resize(rows_ * words_);
+  seen_.resize(rows_ * words_), unknown_.resize(rows_ * words_), facing_.resize(rows_ * words_);
   if (coloured_) transmittance_.resize(rows_ * slots_);
 }
 
@@ -108,9 +111,13 @@ void VisibilityTable::set(size_t row, uint32_t slot, const Rgb& visibility) {
   if (coloured_) transmittance_[row * slots_ + slot] = packed;
 }
 
-bool VisibilityTable::could_brighten(size_t row, uint32_t slot) const {
-  if (!could_darken(row, slot)) return true;
-  return coloured_ && transmittance_[row * slots_ + slot] != 0xffff;
+uint64_t VisibilityTable::could_brighten(size_t row, uint32_t word) const {
+  uint64_t whole = seen(row)[word];
+  if (coloured_)
+    for (uint64_t bits = whole; bits; bits &= bits - 1)
+      if (transmittance_[row * slots_ + word * 64 + uint32_t(std::countr_zero(bits))] != 0xffff)
+        whole &= ~(bits & -bits);
+  return facing_[row * words_ + word] & ~whole;
 }
 
 void VisibilityTable::write(std::vector<char>& bytes) const {
@@ -130,6 +137,7 @@ void VisibilityTable::read(size_t rows, const char* from) {
     from += count * sizeof(values[0]);
   };
   take(seen_, rows_ * words_), take(unknown_, rows_ * words_);
+  facing_.assign(rows_ * words_, ~uint64_t(0));  // until they are asked
   if (coloured_) take(transmittance_, rows_ * slots_);
   if (slots_ % 64)
     for (size_t row = 0; row < rows_; ++row)  // no bit beyond the slots, whatever the file says
@@ -138,7 +146,7 @@ void VisibilityTable::read(size_t rows, const char* from) {
 }
 
 size_t VisibilityTable::bytes() const {
-  return 8 * (seen_.capacity() + unknown_.capacity()) + 2 * transmittance_.capacity();
+  return 8 * (seen_.capacity() + unknown_.capacity() + facing_.capacity()) + 2 * transmittance_.capacity();
 }
 
 }  // namespace afterglow::instant_cache

@@ -2,7 +2,7 @@
 // Records of the instant cache (Debattista et al. 2009, section 3.2): where light was gathered, how much, and for each
 // virtual light whether it was seen. The paper keeps each light's contribution in four bytes; kept here is visibility
 // alone, one bit a light where everything is opaque and 16 bits of coloured transmittance elsewhere. Contributions are
-// recomputed from it, so that sums never drift: with 256 lights a record and its gradients take 245 or 757 bytes.
+// recomputed from it, so that sums never drift: with 256 lights a record and its gradients take 277 or 789 bytes.
 #pragma once
 
 #include <vector>
@@ -60,20 +60,22 @@ class VisibilityTable {
   const uint64_t* seen(size_t row) const { return seen_.data() + row * words_; }
   Rgb get(size_t row, uint32_t slot) const;
   void set(size_t row, uint32_t slot, const Rgb&);
-  /// Whether an object that comes into the way could change it, and one that leaves it.
-  bool could_darken(size_t row, uint32_t slot) const { return seen(row)[slot / 64] >> (slot % 64) & 1; }
-  bool could_brighten(size_t row, uint32_t slot) const;
+  /// Lights that face the record, as found when they were last asked: the others can do what they want.
+  uint64_t* facing(size_t row) { return facing_.data() + row * words_; }
+  /// 64 bits: whether an object that comes into the way could change it, and one that leaves it.
+  uint64_t could_darken(size_t row, uint32_t word) const { return seen_[row * words_ + word]; }
+  uint64_t could_brighten(size_t row, uint32_t word) const;
   size_t bytes() const;
   /// All rows as they are, to the end of a file's bytes; and rows from there, over what reset() made.
   void write(std::vector<char>&) const;
   void read(size_t rows, const char*);
-  size_t row_bytes() const { return words_ * 16 + (coloured_ ? slots_ * 2 : 0); }
+  size_t row_bytes() const { return words_ * 24 + (coloured_ ? slots_ * 2 : 0); }
 
  private:
   uint32_t slots_ = 0, words_ = 0;
   bool coloured_ = false;
   size_t rows_ = 0;
-  std::vector<uint64_t> seen_, unknown_;
+  std::vector<uint64_t> seen_, unknown_, facing_;
   std::vector<uint16_t> transmittance_;  // only where coloured
 };
 
