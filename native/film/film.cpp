@@ -3,6 +3,7 @@
 #include "film/film.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "base/parallel.h"
@@ -67,13 +68,31 @@ Film::Film(const FilmSettings& settings)
       counts_(size_t(width()) * height()),
       locks_(counts_.size() / 32 + 1) {}
 
-size_t Film::bytes() const { return sums_.size() * sizeof(float) + counts_.size() * sizeof(uint32_t) + locks_.size(); }
+size_t Film::bytes() const {
+  return (sums_.size() + squares_.size()) * sizeof(float) + (counts_.size() + extras_.size()) * sizeof(uint32_t) +
+         locks_.size();
+}
 
 void Film::clear() {  // sums without samples are never read: they need no zeros
   std::fill(counts_.begin(), counts_.end(), 0u);
+  std::fill(extras_.begin(), extras_.end(), 0u);
+  std::fill(squares_.begin(), squares_.end(), 0.0f);
 }
 
-void Film::add(uint32_t x, uint32_t y, const float* sums, uint32_t samples) {
+void Film::keep_noise() {
+  if (keeps_noise()) return;
+  squares_.assign(counts_.size(), 0.0f);
+  extras_.assign(counts_.size(), 0u);
+}
+
+PixelNoise Film::noise(size_t pixel) const {
+  const Lock lock(*this, pixel);
+  if (!counts_[pixel]) return {};
+  const float* c = sums_.data() + pixel * size_t(layout_.floats) + size_t(layout_[Pass::kCombined]);
+  return {luminance(Rgb(c[0], c[1], c[2])), squares_[pixel], counts_[pixel], extras_[pixel]};
+}
+
+void Film::add(uint32_t x, uint32_t y, const float* sums, uint32_t samples, float squares, bool extra) {
   const size_t pixel = size_t(y - settings_.y0) * width() + (x - settings_.x0);
   float* to = sums_.data() + pixel * size_t(layout_.floats);
   const Lock lock(*this, pixel);
@@ -82,6 +101,9 @@ void Film::add(uint32_t x, uint32_t y, const float* sums, uint32_t samples) {
   else
     std::copy_n(sums, layout_.floats, to);
   counts_[pixel] += samples;
+  if (squares_.empty()) return;
+  squares_[pixel] += squares;
+  if (extra) extras_[pixel] += samples;
 }
 
 void Film::read_pixel(Pass pass, const float* sums, uint32_t samples, float* out) const {
@@ -168,7 +190,7 @@ void Film::read_row(Pass pass, float* out, uint32_t y, uint32_t step) const {
     {
       const Lock lock(*this, pixel);
       std::memcpy(sums.data(), sums_.data() + pixel * size_t(layout_.floats), size_t(layout_.floats) * sizeof(float));
-      samples = counts_[pixel];
+      samples = pass == Pass::kBatches ? in_batches(pixel) : counts_[pixel];
     }
     if (!samples) sums.fill(0.0f);
     read_pixel(pass, sums.data(), samples, to);
@@ -179,7 +201,18 @@ uint32_t Film::batch_sums(size_t pixel, float* sums) const {
   const Lock lock(*this, pixel);
   std::memcpy(sums, sums_.data() + pixel * size_t(layout_.floats) + size_t(layout_[Pass::kBatches]),
               kBatchCount * sizeof(float));
-  return counts_[pixel];
+  const uint32_t samples = in_batches(pixel);
+  if (samples == counts_[pixel] || !samples) return samples;
+  // Extra samples make the mean surer: batches are shown as far apart as if all had stood in them.
+  double mean = 0.0;
+  for (int b = 0; b < kBatchCount; ++b) mean += sums[b];
+  mean /= samples;
+  const double share = std::sqrt(double(samples) / counts_[pixel]);
+  for (uint32_t b = 0; b < kBatchCount; ++b) {
+    const double whole = mean * batch_samples(samples, b);
+    sums[b] = float(whole + share * (sums[b] - whole));
+  }
+  return samples;
 }
 
 void Film::read_error(float* out, uint32_t step) const {

@@ -39,6 +39,14 @@ struct PixelRequest {
   /// Leaves out the pixels that stand on a grid of this step, because an earlier request had them; 0: none.
   uint16_t skip = 0;
   uint32_t first = 0, count = 1;
+  /// Samples beyond those that every pixel gets, where the picture is noisy: numbered by themselves.
+  bool extra = false;
+};
+
+/// What a pixel's samples tell of its noise.
+struct PixelNoise {
+  float sum = 0.0f, squares = 0.0f;  // of the samples' luminances
+  uint32_t samples = 0, extra = 0;   // all samples, and those of extra requests among them
 };
 
 /// Samples that a request takes, those left out not counted.
@@ -66,8 +74,13 @@ class Film {
   uint32_t height() const { return settings_.y1 - settings_.y0; }
   size_t bytes() const;
 
-  /// Adds the sums of `samples` samples of one pixel of the full image: layout().floats values.
-  void add(uint32_t x, uint32_t y, const float* sums, uint32_t samples);
+  /// From here on squares of luminances and extra samples are kept, too.
+  void keep_noise();
+  bool keeps_noise() const { return !squares_.empty(); }
+  PixelNoise noise(size_t pixel) const;
+  /// Adds the sums of `samples` samples of one pixel of the full image: layout().floats values. Extra samples stand in
+  /// no batch.
+  void add(uint32_t x, uint32_t y, const float* sums, uint32_t samples, float squares = 0.0f, bool extra = false);
   void clear();
 
   /// A pass over the region, row 0 at the bottom, pass_info(pass).channels values a pixel. step > 1: only every step-th
@@ -77,7 +90,8 @@ class Film {
 
  private:
   class Lock;
-  uint32_t batch_sums(size_t pixel, float* sums) const;  // returns the pixel's samples
+  uint32_t batch_sums(size_t pixel, float* sums) const;  // returns the samples that stand in batches
+  uint32_t in_batches(size_t pixel) const { return counts_[pixel] - (extras_.empty() ? 0u : extras_[pixel]); }
   void read_error(float* out, uint32_t step) const;
   void read_row(Pass, float* out, uint32_t y, uint32_t step) const;
   void read_pixel(Pass, const float* sums, uint32_t samples, float* out) const;
@@ -86,6 +100,8 @@ class Film {
   PixelFilter filter_;
   std::vector<float> sums_;
   std::vector<uint32_t> counts_;
+  std::vector<float> squares_;    // empty: no noise is kept
+  std::vector<uint32_t> extras_;  // of counts_
   mutable std::vector<std::atomic_flag> locks_;
 };
 

@@ -5,7 +5,6 @@
 // lobes.
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "base/cancel.h"
@@ -19,8 +18,7 @@ struct LayerPixel {
   float segment = 0.0f;    // length of the last ray
   float error = 0.0f;      // relative, as whoever answered believes; 0: exact, to be left alone
   Rgb light{0.0f};
-  bool present = false;  // a surface is there
-  bool hole = false;     // but nothing answered for it
+  bool hole = false;  // nothing answered for it
 };
 
 /// Edge-stopping functions, all from 0 to 1 and without units.
@@ -31,7 +29,26 @@ float luminance_stop(const Rgb& a, const Rgb& b, float error);            // (6)
 
 /// Three passes of a 5 × 5 kernel whose taps spread by 1, 2 and 4 pixels (Dammertz et al. 2010). Holes take the mean of
 /// what surrounds them on their surface. Pixels that are exact stay as they are. The same on any number of threads.
-void filter_layer(std::span<const LayerPixel> in, uint32_t width, uint32_t height, std::span<Rgb> out,
-                  unsigned threads = 0, StopToken stop = {});
+/// One layer after another: begin(), set() for each pixel that has a surface there, run(), light() of each.
+class LayeredFilter {
+ public:
+  /// An empty layer. Keeps its memory from layer to layer.
+  void begin(uint32_t width, uint32_t height);
+  /// Pixels may be set from several threads, each once.
+  void set(size_t pixel, const LayerPixel&);
+  void run(unsigned threads = 0, StopToken stop = {});
+  Rgb light(size_t pixel) const { return {red_[pixel], green_[pixel], blue_[pixel]}; }
+
+ private:
+  struct Sums;
+  void row(int y, int step);
+  void tap(size_t p, size_t q, size_t count, float kernel, float reach, float step, Sums&) const;
+
+  uint32_t width_ = 0, height_ = 0;
+  std::vector<float> x_, y_, z_, nx_, ny_, nz_, footprint_, segment_, error_, red_, green_, blue_, luminance_;
+  std::vector<float> known_;                          // 1: light stands there, 0: none
+  std::vector<float> next_[3], next_known_;           // of the pass that runs
+  std::vector<uint8_t> todo_;                         // to be filtered
+};
 
 }  // namespace afterglow

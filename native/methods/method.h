@@ -44,6 +44,7 @@ struct MethodTraits {
   uint32_t interleave = 1;   // n: neighbouring pixels ask n × n different parts of the lights; answers want the
                              // discontinuity buffer
   bool fills_holes = false;  // prepare() wants only the points that gather() could not answer
+  float extra = 0.0f;        // camera samples beyond every pixel's own, where noise is: as many a pixel on average
   bool exact = false;        // samples are independent and without bias: what they spread by is the picture's error
 };
 
@@ -72,6 +73,7 @@ struct Work {
   const std::vector<uint64_t>* shown = nullptr;   // local view: one bit an instance (InstanceMask); null: everything
   const std::atomic<bool>* pause = nullptr;       // while true, no new request is begun
   std::atomic<uint64_t>* samples_done = nullptr;  // grows as requests are finished
+  bool extra = false;  // requests ask for more samples where the picture is noisy: methods answer from what they have
 };
 
 struct MethodStatistics {

@@ -41,7 +41,7 @@ void Renderer::update(const CommittedScene& scene, Work& work) {
 
 void Renderer::render(const CommittedScene& scene, std::span<const PixelRequest> requests, Film& film, Work& work) {
   if (method_->traits().terms == kAllTerms) return method_->render(scene, requests, film, work);
-  render_wavefronts(*method_, scene, requests, film, work, settings_, times_);
+  render_wavefronts(*method_, scene, requests, film, work, settings_, times_, wave_);
 }
 
 void Renderer::save(const CommittedScene& scene, const std::string& path) const {

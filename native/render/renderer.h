@@ -26,6 +26,7 @@ class Renderer {
   const std::string& method() const { return id_; }
   /// Whether what samples spread by is the picture's error, or noise alone.
   bool exact() const { return method_->traits().exact; }
+  float extra() const { return method_->traits().extra; }
   bool running() const { return method_->traits().running; }
   void configure(const Settings&);
 
@@ -44,6 +45,7 @@ class Renderer {
   uint64_t version_ = 0;
   WalkSettings settings_;
   WavefrontTimes times_;
+  Wavefront wave_;  // memory of its last render
 };
 
 }  // namespace afterglow

@@ -6,6 +6,7 @@
 
 #include "base/errors.h"
 #include "film/denoise_task.h"
+#include "render/extra_samples.h"
 #include "render/session.h"
 
 namespace afterglow {
@@ -78,6 +79,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     statistics_.seconds["prepare"] = now() - begun;
     stage_ = "rendering";
   }
+  if (renderer.extra() > 0.0f) film.keep_noise();
   const FilmSettings& f = film.settings();
   const uint64_t pixels = uint64_t(film.width()) * film.height();
   const ScheduleOptions options{before + settings.samples, settings.viewport, settings.time_limit > 0.0f,
@@ -94,6 +96,12 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     renderer.render(*scene_, requests, film, work);
     if (stop_) break;
     if (plan.step == 1) done = plan.first + plan.count;
+    if (renderer.extra() > 0.0f && plan.step == 1) {
+      work.extra = true;
+      renderer.render(*scene_, extra_requests(film, renderer.extra()), film, work);
+      work.extra = false;
+      if (stop_) break;
+    }
     const double seconds = now() - begun;
     in_passes += seconds;
     uint64_t samples = 0;

@@ -3,12 +3,13 @@
 #include "render/wavefront.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <mutex>
 #include <thread>
 
 #include "base/parallel.h"
 #include "film/discontinuity.h"
-#include "film/layered_filter.h"
 #include "render/wavefront_kernel.h"
 
 namespace afterglow {
@@ -16,6 +17,7 @@ namespace afterglow {
 namespace {
 
 constexpr uint64_t kMostSamples = 1u << 18;  // of one wavefront: about 50 MB of questions
+constexpr size_t kMostRequests = 1u << 15;
 constexpr size_t kGatherBlock = 512;
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
@@ -30,36 +32,36 @@ class Stopwatch {
   double begun_;
 };
 
-/// All questions of a wavefront in the order of its requests.
-struct Wavefront {
-  std::vector<WalkedRequest> requests;
-  std::vector<CachePoint> points;
-  std::vector<Answer> answers;
-  std::vector<size_t> first;  // of each request's points
-};
-
 void walk(const path_tracing::KernelInput& input, WalkKernel kernel, std::span<const PixelRequest> requests,
-          uint32_t lights, Wavefront& wave, Work& work, WavefrontTimes& times) {
+          uint32_t lights, bool noise, Wavefront& wave, Work& work, WavefrontTimes& times) {
   const Stopwatch watch(times.walk);
-  wave.requests.resize(requests.size());
+  if (wave.requests.size() < requests.size()) wave.requests.resize(requests.size());
   parallel_blocks(
       requests.size(), 1, work.threads,
       [&](size_t begin, size_t end) {
         for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
           while (work.pause && work.pause->load() && !work.stop.stop())
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
-          wave.requests[i].lights = lights;
+          wave.requests[i].clear(lights, noise);
           kernel(input, requests[i], wave.requests[i]);
         }
       },
       work.stop);
-  for (const WalkedRequest& r : wave.requests) {
-    wave.first.push_back(wave.points.size());
-    wave.points.insert(wave.points.end(), r.points.begin(), r.points.end());
-    times.counts += r.counts;
+  wave.first.clear();
+  size_t points = 0;
+  for (size_t i = 0; i < requests.size(); ++i) {
+    wave.first.push_back(points);
+    points += wave.requests[i].points.size();
+    times.counts += wave.requests[i].counts;
   }
-  wave.answers.resize(wave.points.size());
-  times.points += wave.points.size();
+  wave.points.resize(points);
+  wave.answers.assign(points, Answer{});
+  parallel_blocks(requests.size(), 64, work.threads, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      std::copy(wave.requests[i].points.begin(), wave.requests[i].points.end(),
+                wave.points.begin() + ptrdiff_t(wave.first[i]));
+  });
+  times.points += points;
 }
 
 void gather(const IndirectMethod& method, const CommittedScene& scene, std::span<const CachePoint> points,
@@ -142,27 +144,40 @@ void share(std::span<const PixelRequest> requests, uint32_t interleave, Wavefron
 void filter_layers(std::span<const PixelRequest> requests, Wavefront& wave, const Work& work, WavefrontTimes& times) {
   const Stopwatch watch(times.filter);
   const PixelBox box = pixels_of(requests);
-  uint32_t layers = 0;
-  const auto layer_of = [](const CachePoint& p) { return 2u * p.layer + p.translucent; };
-  for (const CachePoint& p : wave.points) layers = std::max(layers, layer_of(p) + 1);
-  std::vector<LayerPixel> grid(size_t(box.width) * box.height);
-  std::vector<Rgb> filtered(grid.size());
-  for (uint32_t layer = 0; layer < layers && !work.stop.stop(); ++layer) {
-    std::fill(grid.begin(), grid.end(), LayerPixel{});
-    size_t present = 0;
-    for (size_t i = 0; i < wave.points.size(); ++i) {
+  std::array<size_t, 256> present{};
+  std::mutex mutex;
+  const size_t count = wave.points.size();
+  wave.layers.resize(count);
+  const auto each = [&](const std::function<void(size_t, size_t)>& body) {
+    parallel_blocks(count, 16384, work.threads, body, work.stop);
+  };
+  each([&](size_t begin, size_t end) {
+    std::array<size_t, 256> own{};
+    for (size_t i = begin; i < end; ++i) {
       const CachePoint& p = wave.points[i];
-      const Answer& a = wave.answers[i];
-      if (layer_of(p) != layer) continue;
-      present++;
-      grid[box.index(p)] = {p.position,       p.normal, p.footprint, p.segment,
-                            a.relative_error, a.light,  true,        !(a.weight > 0.0f)};
+      own[wave.layers[i] = uint8_t(std::min(2u * p.layer + p.translucent, 255u))]++;
     }
-    if (!present) continue;
-    filter_layer(grid, box.width, box.height, filtered, work.threads, work.stop);
+    const std::lock_guard lock(mutex);
+    for (size_t layer = 0; layer < own.size(); ++layer) present[layer] += own[layer];
+  });
+  for (uint32_t layer = 0; layer < present.size() - 1 && !work.stop.stop(); ++layer) {
+    if (!present[layer]) continue;
+    wave.filter.begin(box.width, box.height);
+    each([&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        if (wave.layers[i] != layer) continue;
+        const CachePoint& p = wave.points[i];
+        const Answer& a = wave.answers[i];
+        wave.filter.set(box.index(p), {p.position, p.normal, p.footprint, p.segment, a.relative_error, a.light,
+                                       !(a.weight > 0.0f)});
+      }
+    });
+    wave.filter.run(work.threads, work.stop);
     if (work.stop.stop()) return;
-    for (size_t i = 0; i < wave.points.size(); ++i)
-      if (layer_of(wave.points[i]) == layer) wave.answers[i].light = filtered[box.index(wave.points[i])];
+    each([&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i)
+        if (wave.layers[i] == layer) wave.answers[i].light = wave.filter.light(box.index(wave.points[i]));
+    });
   }
 }
 
@@ -223,14 +238,28 @@ void finish(std::span<const PixelRequest> requests, Film& film, Wavefront& wave,
              r.sums.data() + floats * r.questions[k].pixel, lost);
       dropped += lost;
       const PixelRequest& request = requests[i];
+      if (film.keeps_noise() && !shown)
+        for (size_t k = 0; k < r.questions.size(); ++k)
+          r.luminances[r.questions[k].path] += luminance(r.questions[k].weight * wave.answers[wave.first[i] + k].light);
+      const auto squares = [&](size_t pixel) {
+        float sum = 0.0f;
+        for (size_t k = 0; k < request.count && film.keeps_noise(); ++k) {
+          const float l = r.luminances[pixel * request.count + k];
+          sum += l * l;
+        }
+        return sum;
+      };
       const FilmSettings& f = film.settings();
       size_t pixel = 0;
       for (uint32_t y = request.y; y < uint32_t(request.y) + request.height; y += request.step)
         for (uint32_t x = request.x; x < uint32_t(request.x) + request.width; x += request.step) {
           if (request.skip && (x - f.x0) % request.skip == 0 && (y - f.y0) % request.skip == 0) continue;
-          film.add(x, y, r.sums.data() + floats * pixel++, request.count);
+          float* sums = r.sums.data() + floats * pixel;
+          if (request.extra) std::fill_n(sums + film.layout()[Pass::kBatches], kBatchCount, 0.0f);
+          film.add(x, y, sums, request.count, squares(pixel), request.extra);
+          ++pixel;
         }
-      if (work.samples_done) *work.samples_done += sample_count(request);
+      if (work.samples_done && !request.extra) *work.samples_done += sample_count(request);
     }
   });
   times.dropped += dropped;
@@ -246,7 +275,8 @@ WalkKernel choose_walk_kernel(const Effects& effects, PassSet passes, bool local
 }
 
 void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std::span<const PixelRequest> all,
-                       Film& film, Work& work, const WalkSettings& settings, WavefrontTimes& times) {
+                       Film& film, Work& work, const WalkSettings& settings, WavefrontTimes& times,
+                       Wavefront& wave) {
   const CameraRays camera(scene.scene.camera(), scene.scene.origin(), film.settings().width, film.settings().height);
   const path_tracing::KernelInput input{.walk = {scene, settings.limits, work.shown, film.layout()[Pass::kUv] >= 0},
                                         .camera = camera,
@@ -259,8 +289,8 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
   const MethodTraits traits = method.traits();
   const uint32_t interleave = traits.interleave;
   std::vector<PixelRequest> requests(all.begin(), all.end());
-  const bool layers = traits.layers;
-  const bool apart = interleave > 1 || layers;
+  const bool layers = traits.layers && !work.extra;  // extra samples have no neighbours
+  const bool apart = (interleave > 1 || layers) && !work.extra;
   if (apart) {  // neighbours share what they found for the same sample
     requests.clear();
     uint32_t most = 0;
@@ -274,15 +304,15 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
     uint64_t samples = 0;
     do samples += sample_count(requests[end++]);
     while (end < requests.size() && samples + sample_count(requests[end]) <= kMostSamples &&
+           end - begin < kMostRequests &&
            (!apart || requests[end].first == requests[begin].first));
     const std::span<const PixelRequest> part(requests.data() + begin, end - begin);
     begin = end;
-    Wavefront wave;
-    walk(input, kernel, part, traits.lights, wave, work, times);
+    walk(input, kernel, part, traits.lights, film.keeps_noise(), wave, work, times);
     if (work.stop.stop()) return;
     answer(method, scene, wave, work, times);
     if (work.stop.stop()) return;
-    if (interleave > 1) share(part, interleave, wave, work, times);
+    if (interleave > 1 && !work.extra) share(part, interleave, wave, work, times);
     if (layers) filter_layers(part, wave, work, times);
     if (work.stop.stop()) return;
     finish(part, film, wave, settings, work, times);

@@ -23,6 +23,11 @@ class AskingVisitor : public path_tracing::FilmVisitor<kPasses> {
     layer_ = 0;
   }
 
+  void end_path() {
+    if (out_.noise) out_.luminances.push_back(luminance(this->light_));
+    this->end_sample();
+  }
+
   /// More where more of the light reaches the picture.
   uint32_t lights(const PathState& path) const {
     return glm::max(1u, uint32_t(std::lround(float(out_.lights) * glm::min(1.0f, max_component(path.throughput)))));
@@ -54,7 +59,7 @@ class AskingVisitor : public path_tracing::FilmVisitor<kPasses> {
     out_.points.push_back(ask);
     Question q;
     q.weight = path.throughput * albedo * kInvPi;
-    q.pixel = pixel_, q.sample = sample_;
+    q.pixel = pixel_, q.sample = sample_, q.path = uint32_t(out_.luminances.size());
     q.direct = path.context.depth == 0;
     if constexpr (kPasses)
       q.diffuse = this->diffuse_share_, q.glossy = this->glossy_share_, q.transmission = this->transmission_share_;
@@ -82,10 +87,13 @@ void walk_request(const path_tracing::KernelInput& in, const PixelRequest& reque
           (y - in.film.settings().y0) % request.skip == 0)
         continue;
       visitor.begin_pixel();
-      const uint32_t pixel_seed = hash(x, y, in.seed);
-      bool placing = kPasses && request.first == 0 && visitor.wants_place();  // one walk more, before the first sample
+      const uint32_t pixel_seed = hash(x, y, request.extra ? ~in.seed : in.seed);
+      // One walk more, before the first sample.
+      bool placing = kPasses && request.first == 0 && !request.extra && visitor.wants_place();
       for (uint32_t i = request.first; i < request.first + request.count;) {
-        Sampler sampler(hash(pixel_seed, batch_of(i)), index_in_batch(i));
+        // One stratified set for all samples of a pixel: batches of their own would be worth less, and tell nothing of
+        // the bias that a method has.
+        Sampler sampler(pixel_seed, i);
         const Vec2 in_pixel = in.film.filter().offset(sampler.next2());
         const Vec2 on_lens = lens ? sampler.next2() : Vec2(0.5f);
         const Vec2 middle(float(x) + 0.5f, float(y) + 0.5f);
@@ -96,9 +104,9 @@ void walk_request(const path_tracing::KernelInput& in, const PixelRequest& reque
         path.context.footprint = path_tracing::mean_length(camera_ray.origin_dx, camera_ray.origin_dy);
         path.pixel_angle = path_tracing::mean_length(camera_ray.direction_dx, camera_ray.direction_dy);
         placing ? visitor.begin_place(path) : visitor.begin_sample(path, i);
-        visitor.begin_path(pixel, i, uint16_t(x / request.step), uint16_t(y / request.step));
+        visitor.begin_path(pixel, request.extra ? ~i : i, uint16_t(x / request.step), uint16_t(y / request.step));
         walker.walk(path, sampler, visitor);
-        placing ? visitor.end_place() : visitor.end_sample();
+        placing ? visitor.end_place() : visitor.end_path();
         i += placing ? 0 : 1;
         placing = false;
       }

@@ -14,10 +14,13 @@ namespace {
 constexpr float kFarthest = 0.04f;  // of the ray's length: how far look-ups may be scattered beyond the asked jitter
 constexpr float kEnough = 0.01f;    // share of the light that the levels above need not bring
 
+constexpr uint32_t kEven = 1024;    // samples from which on a cell shows no blotches
+constexpr size_t kGroup = 32;       // questions whose cells are fetched from memory together
+
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 /// Cells of few samples are blotches; look-ups that scatter farther make fine grain of them, which filters take away.
-float widened(uint32_t count) { return std::clamp(std::sqrt(1024.0f / float(count + 1)), 1.0f, 6.0f); }
+float widened(uint32_t count) { return std::clamp(std::sqrt(float(kEven) / float(count + 1)), 1.0f, 6.0f); }
 
 /// From blue over green to red.
 Rgb scale_color(float t) {
@@ -82,33 +85,45 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   const uint32_t more = settings_.caching.store;  // every stored vertex counts its own scatterings
   walk.limits.max_bounces += more, walk.limits.diffuse += more, walk.limits.glossy += more;
   walk.limits.transmission += more, walk.limits.transparent += more;
+  // Cells that are there already get paths more rarely the more they hold; points without one are asked for holes.
+  const float resolution = work.extra ? 0.0f : settings_.resolution;
   std::vector<float> shares(points.size());
-  parallel_blocks(points.size(), 256, work.threads, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      const CachePoint& p = points[i];
-      const int level = int(grid_.level(p.footprint * settings_.caching.cell_pixels));
-      const Record* r = table_.find(grid_.cell(p.position, owner_of(p.instance, p.face_normal), level));
-      shares[i] = settings_.resolution * share_of_paths(r ? r->count() : 0, settings_.enough);
+  std::vector<uint8_t> empty(points.size());
+  parallel_blocks(points.size(), 1024, work.threads, [&](size_t begin, size_t end) {
+    uint64_t keys[kGroup];
+    for (size_t at = begin; at < end; at += kGroup) {
+      const size_t n = std::min(kGroup, end - at);
+      for (size_t k = 0; k < n; ++k) {
+        const CachePoint& p = points[at + k];
+        const int level = int(grid_.level(p.footprint * settings_.caching.cell_pixels));
+        keys[k] = key_of(grid_.cell(p.position, owner_of(p.instance, p.face_normal), level));
+        table_.prefetch(keys[k]);
+      }
+      for (size_t k = 0; k < n; ++k) {
+        const Record* r = table_.find(keys[k]);
+        shares[at + k] = resolution * share_of_paths(r ? r->count() : 0, settings_.enough);
+        empty[at + k] = !r;
+      }
     }
   });
   std::array<std::vector<CachePoint>, 3> slices;  // the first few fill cells in which the others end
-  std::vector<CachePoint> rest;
+  std::vector<uint32_t> rest;  // without a path, and their own cell is empty
   for (size_t i = 0; i < points.size(); ++i) {
     const float u = unit_float(hash(hash_of(points[i], seed_), points[i].sample, 1));
     if (u < shares[i])
       slices[u < 0.03f * shares[i] ? 0 : u < 0.2f * shares[i] ? 1 : 2].push_back(points[i]);
-    else
-      rest.push_back(points[i]);
+    else if (empty[i])
+      rest.push_back(uint32_t(i));
   }
   for (const auto& slice : slices)
     if (!slice.empty() && !trace(walk, slice, work)) return;
-  std::vector<uint8_t> open(rest.size());
+  std::vector<uint8_t> hole(rest.size());
   parallel_blocks(rest.size(), 256, work.threads, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) open[i] = !(answer(rest[i]).weight > 0.0f);
+    for (size_t i = begin; i < end; ++i) hole[i] = open(points[rest[i]]);
   });
   std::vector<CachePoint> holes;
   for (size_t i = 0; i < rest.size(); ++i)
-    if (open[i]) holes.push_back(rest[i]);
+    if (hole[i]) holes.push_back(points[rest[i]]);
   counts_.holes += holes.size();
   if (!holes.empty()) trace(walk, holes, work);
 }
@@ -119,39 +134,83 @@ const Record* Cache::look_up(const CachePoint& p, const Vec3& offset, uint32_t o
   return record ? record : table_.find(grid_.cell(p.position, owner, level));
 }
 
-Answer Cache::answer(const CachePoint& p) const {
+/// Whether no cell at all could answer.
+bool Cache::open(const CachePoint& p) const {
   const uint32_t owner = owner_of(p.instance, p.face_normal);
-  const float wanted = grid_.level(p.footprint * settings_.caching.cell_pixels);
-  const int finest = int(wanted);
-  const uint32_t random = hash(hash_of(p, seed_), p.sample, 2);
-  const Frame frame(p.face_normal);
-  const Record* here = settings_.jitter > 0.0f ? table_.find(grid_.cell(p.position, owner, finest)) : nullptr;
-  const float wide = std::max(1.0f, std::min(widened(here ? here->count() : 0),
-                                             kFarthest * p.segment / (settings_.jitter * grid_.size(finest))));
-  const Vec3 offset =
-      settings_.jitter * wide *
-      ((2.0f * unit_float(random) - 1.0f) * frame.t + (2.0f * unit_float(hash(random)) - 1.0f) * frame.b);
+  for (int level = int(grid_.level(p.footprint * settings_.caching.cell_pixels)); level <= kTopLevel; ++level)
+    if (table_.find(grid_.cell(p.position, owner, level)) ||
+        table_.find(grid_.cell(p.position, owner | kOnTheWay, level)))
+      return false;
+  return true;
+}
+
+/// The level between two is told by lot, in proportion: that asks half as many cells as their blend.
+Cache::LookUp Cache::first_look(const CachePoint& p) const {
+  LookUp look;
+  look.owner = owner_of(p.instance, p.face_normal);
+  const uint32_t random = hash(hash_of(p, seed_), p.sample, 2), second = hash(random);
+  look.level = std::min(int(grid_.level(p.footprint * settings_.caching.cell_pixels) + unit_float(hash(second))), kTopLevel);
+  if (settings_.jitter > 0.0f) {
+    const Frame frame(p.face_normal);
+    look.offset = settings_.jitter *
+                  ((2.0f * unit_float(random) - 1.0f) * frame.t + (2.0f * unit_float(second) - 1.0f) * frame.b);
+  }
+  look.key = key_of(grid_.cell(p.position + look.offset * grid_.size(look.level), look.owner, look.level));
+  return look;
+}
+
+/// A cell of few samples was found, or none: look-ups scatter farther.
+void Cache::wider(const CachePoint& p, LookUp& look) const {
+  if (!(settings_.jitter > 0.0f)) return;
+  const float farthest = kFarthest * p.segment / (settings_.jitter * grid_.size(look.level));
+  const float wide = std::max(1.0f, std::min(widened(look.first ? look.first->count() : 0), farthest));
+  if (!(wide > 1.0f)) return;
+  look.offset *= wide;
+  look.key = key_of(grid_.cell(p.position + look.offset * grid_.size(look.level), look.owner, look.level));
+  table_.prefetch(look.key);
+}
+
+void Cache::answer(std::span<const CachePoint> points, std::span<Answer> answers) const {
+  LookUp looks[kGroup];
+  for (size_t at = 0; at < points.size(); at += kGroup) {
+    const size_t n = std::min(kGroup, points.size() - at);
+    for (size_t k = 0; k < n; ++k) table_.prefetch((looks[k] = first_look(points[at + k])).key);
+    for (size_t k = 0; k < n; ++k) {
+      LookUp& look = looks[k];
+      look.first = table_.find(look.key);
+      look.settled = look.first && look.first->count() >= kEven;
+      if (!look.settled) wider(points[at + k], look);
+    }
+    for (size_t k = 0; k < n; ++k) answers[at + k] = resolve(points[at + k], looks[k]);
+  }
+}
+
+Answer Cache::resolve(const CachePoint& p, const LookUp& look) const {
+  const Record* record = look.settled ? look.first : table_.find(look.key);
+  if (!record) record = look.first;
+  if (record && float(record->count()) >= settings_.trusted)
+    return {kPi * shown(*record, p, look.level), 1.0f, 1.0f / std::sqrt(1.0f + float(record->count()))};
+  return blend(p, look);
+}
+
+/// Where cells hold few samples: each level adds what it is trusted with, the next larger one fills up.
+Answer Cache::blend(const CachePoint& p, const LookUp& look) const {
   Rgb light(0.0f);
   float missing = 1.0f, samples = 0.0f;
-  for (int level = finest; level <= kTopLevel && missing > kEnough; ++level) {
-    // A cell longer than the way that the ray came holds light of places that the ray has left long ago.
-    if (level > finest + 1 && missing < 1.0f && grid_.size(level) > p.segment) break;
-    const Record* record = look_up(p, offset, owner, level);
-    if (!record) continue;
-    const float share = (level == finest ? 1.0f - (wanted - float(finest)) : 1.0f);
-    const float taken = missing * share * trust(record->count(), settings_.trusted);
-    light += taken * shown(*record, p, level);
-    samples += taken * float(record->count());
+  const auto take = [&](const Record& record, int level) {
+    const float taken = missing * trust(record.count(), settings_.trusted);
+    light += taken * shown(record, p, level);
+    samples += taken * float(record.count());
     missing -= taken;
+  };
+  for (int level = look.level; level <= kTopLevel && missing > kEnough; ++level) {
+    // A cell longer than the way that the ray came holds light of places that the ray has left long ago.
+    if (level > look.level && missing < 1.0f && grid_.size(level) > p.segment) break;
+    if (const Record* record = look_up(p, look.offset, look.owner, level)) take(*record, level);
   }
   // Where the camera's paths have left nothing at all: what others found there, without the last of their bounces.
-  for (int level = finest; level <= kTopLevel && !(missing < 1.0f); ++level)
-    if (const Record* record = look_up(p, offset, owner | kOnTheWay, level)) {
-      const float taken = trust(record->count(), settings_.trusted);
-      light += taken * shown(*record, p, level);
-      samples += taken * float(record->count());
-      missing -= taken;
-    }
+  for (int level = look.level; level <= kTopLevel && !(missing < 1.0f); ++level)
+    if (const Record* record = look_up(p, look.offset, look.owner | kOnTheWay, level)) take(*record, level);
   if (!(missing < 1.0f)) return {};
   const float found = 1.0f - missing;
   return {kPi / found * light, 1.0f, 1.0f / std::sqrt(1.0f + samples / found)};

@@ -34,14 +34,28 @@ class Cache {
   void update(const CommittedScene&, const SceneChanges&, Work&);
   /// One path from each chosen point, and from each that no cell could answer.
   void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
-  Answer answer(const CachePoint&) const;
+  void answer(std::span<const CachePoint>, std::span<Answer>) const;
   std::vector<char> save(const CommittedScene&) const;
   void load(const CommittedScene&, std::span<const char>);
   const CacheCounts& counts() const { return counts_; }
   const Table& table() const { return table_; }
 
  private:
+  /// One question: which cell, read first at `offset` cells beside the point, and what else is asked then.
+  struct LookUp {
+    uint32_t owner = 0;
+    int level = 0;
+    Vec3 offset{0.0f};  // in cells
+    uint64_t key = 0;
+    const Record* first = nullptr;
+    bool settled = false;
+  };
+  LookUp first_look(const CachePoint&) const;
+  void wider(const CachePoint&, LookUp&) const;
+  Answer resolve(const CachePoint&, const LookUp&) const;
+  Answer blend(const CachePoint&, const LookUp&) const;
   const Record* look_up(const CachePoint&, const Vec3& offset, uint32_t owner, int level) const;
+  bool open(const CachePoint&) const;
   Rgb shown(const Record&, const CachePoint&, int level) const;
   bool trace(const WalkScene&, std::span<const CachePoint>, Work&);
 

@@ -10,6 +10,7 @@ namespace afterglow::hash_cache {
 namespace {
 
 constexpr uint32_t kLights = 4;
+constexpr float kExtra = 1.0f;
 constexpr const char* kViews[] = {"LIGHT", "LEVEL", "COUNT", "AGE", "SIDE"};
 
 View view_of(const SettingValue& value) {
@@ -22,13 +23,16 @@ View view_of(const SettingValue& value) {
 
 class HashCache final : public IndirectMethod {
  public:
-  MethodTraits traits() const override { return {.layers = filter_, .running = running_, .lights = lights_}; }
+  MethodTraits traits() const override {
+    return {.layers = filter_, .running = running_, .lights = lights_, .extra = extra_};
+  }
 
   void configure(const Settings& settings) override {
     CacheSettings s;
     filter_ = true;
     running_ = true;
     lights_ = kLights;
+    extra_ = kExtra;
     s.caching.walk.configure(settings);
     bool denoised = false;
     for (const auto& [name, value] : settings) {
@@ -45,6 +49,7 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_enough") s.enough = float(number_of(value));
       if (name == "hash_running") running_ = integer_of(value) != 0;
       if (name == "hash_lights") lights_ = uint32_t(integer_of(value));
+      if (name == "hash_extra") extra_ = float(number_of(value));
       if (name == "hash_long_paths") s.caching.long_paths = float(number_of(value));
       if (name == "hash_view") s.view = view_of(value);
     }
@@ -60,7 +65,7 @@ class HashCache final : public IndirectMethod {
     cache_.fill(scene, points, work);
   }
   void gather(const CommittedScene&, std::span<const CachePoint> points, std::span<Answer> answers) const override {
-    for (size_t i = 0; i < points.size(); ++i) answers[i] = cache_.answer(points[i]);
+    cache_.answer(points, answers);
   }
   std::vector<char> save(const CommittedScene& scene) const override { return cache_.save(scene); }
   void load(const CommittedScene& scene, std::span<const char> bytes) override { cache_.load(scene, bytes); }
@@ -90,6 +95,7 @@ class HashCache final : public IndirectMethod {
   Cache cache_;
   bool filter_ = true, running_ = true;
   uint32_t lights_ = kLights;
+  float extra_ = kExtra;
 };
 
 }  // namespace
@@ -112,6 +118,9 @@ MethodDescription describe() {
       "", 0.125, 0.01, 1.0);
   add("hash_lights", "Light Samples", "Times that light sources are asked at the surface that a pixel shows", "",
       int64_t(kLights), 1.0, 64.0);
+  add("hash_extra", "Extra Camera Samples",
+      "Samples beyond every pixel's own, for each of those one on average, that go where the picture is noisy: edges, gloss",
+      "", double(kExtra), 0.0, 16.0);
   add("hash_resolution", "Caching Resolution",
       "Paths that fill the cache, as a share of the image's width and height; what no cell answers is filled anyway",
       "", 1.0, 0.0, 1.0);

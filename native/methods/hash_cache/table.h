@@ -51,8 +51,16 @@ class Table {
   /// Adds the samples to their cells, those of every level sums of the level's below, up to kTopLevel. Returns the
   /// number of cells that were touched.
   uint64_t add(std::vector<Sample> samples, uint32_t stamp, unsigned threads, StopToken stop);
-  const Record* find(const Cell& cell) const {
-    const uint64_t key = key_of(cell);
+  const Record* find(const Cell& cell) const { return find(key_of(cell)); }
+  /// Asks for the memory in which find(key) will look: for many keys at once, before the first is looked up.
+  void prefetch(uint64_t key) const {
+    const Part& part = parts_[key >> 56];
+    if (part.slots.empty()) return;
+    const char* slot = reinterpret_cast<const char*>(part.slots.data() + part.home(key));
+    __builtin_prefetch(slot);
+    __builtin_prefetch(slot + 64);
+  }
+  const Record* find(uint64_t key) const {
     const Part& part = parts_[key >> 56];
     if (part.slots.empty()) return nullptr;
     for (size_t i = part.home(key);; i = i + 1 == part.slots.size() ? 0 : i + 1) {
