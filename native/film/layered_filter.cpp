@@ -29,23 +29,39 @@ constexpr int kRun = 64;              // pixels of a row at a time
 /// it smooths.
 inline float believed(float error) { return kErrorScale * error * std::sqrt(error); }
 
-/// By value: a compiler that sees references makes no vector instructions of a loop.
+/// Eight pixels at once.
+using Floats = float __attribute__((vector_size(32)));
+constexpr int kLanes = 8;
+constexpr Floats kIndices = {0, 1, 2, 3, 4, 5, 6, 7};
+
+inline Floats load(const float* from) {
+  Floats v;
+  std::memcpy(&v, from, sizeof v);
+  return v;
+}
 inline float most(float a, float b) { return a > b ? a : b; }
-inline float normal_weight(float cosine) {
-  const float c = most(0.0f, cosine), c2 = c * c, c4 = c2 * c2;
+inline Floats most(Floats a, Floats b) { return a > b ? a : b; }
+
+// The weights, of one pair of pixels or of eight.
+template <class T>
+T normal_weight(T cosine) {
+  const T c = most(cosine, T{}), c2 = c * c, c4 = c2 * c2;
   return c4 * c4;
 }
-inline float plane_weight(float off, float footprint_a, float footprint_b, float reach) {
-  return most(0.0f, 1.0f - off / (0.5f * reach * most(footprint_a, footprint_b) + kTiny));
+template <class T>
+T plane_weight(T off, T footprint_a, T footprint_b, float reach) {
+  return most(1.0f - most(off, -off) / (0.5f * reach * most(footprint_a, footprint_b) + kTiny), T{});
 }
-inline float segment_weight(float a, float b) {
-  return most(0.0f, 1.0f - kSegment * std::fabs(a - b) / (most(a, b) + kTiny));
+template <class T>
+T segment_weight(T a, T b) {
+  return most(1.0f - kSegment * most(a - b, b - a) / (most(a, b) + kTiny), T{});
 }
 /// 1 - log(1 + y) with y = kLuminance r / (1 + r) by the second Padé approximant, half a hundredth off at most.
-inline float luminance_weight(float a, float b, float error) {
-  const float difference = std::fabs(a - b);
-  const float y = kLuminance * difference / (difference + 0.5f * (a + b) * error + kTiny);
-  return most(0.0f, 1.0f - y * (6.0f + 3.0f * y) / (6.0f + y * (6.0f + y)));
+template <class T>
+T luminance_weight(T a, T b, T error) {
+  const T difference = most(a - b, b - a);
+  const T y = kLuminance * difference / (difference + 0.5f * (a + b) * error + kTiny);
+  return most(1.0f - y * (6.0f + 3.0f * y) / (6.0f + y * (6.0f + y)), T{});
 }
 
 }  // namespace
@@ -66,13 +82,13 @@ float luminance_stop(const Rgb& a, const Rgb& b, float error) {
 
 /// Sums over the taps of a run of pixels.
 struct LayeredFilter::Sums {
-  float red[kRun], green[kRun], blue[kRun], weight[kRun];
+  float red[kRun + kLanes], green[kRun + kLanes], blue[kRun + kLanes], weight[kRun + kLanes];
 };
 
 void LayeredFilter::begin(uint32_t width, uint32_t height) {
   width_ = width, height_ = height;
-  const size_t pixels = size_t(width) * height;
-  for (auto* plane : {&x_, &y_, &z_, &nx_, &ny_, &nz_, &footprint_, &segment_, &error_, &red_, &green_, &blue_, &luminance_,
+  const size_t pixels = size_t(width) * height + kLanes;  // eight are read at once, the last ones, too
+  for (auto* plane : {&x_, &y_, &z_, &nx_, &ny_, &nz_, &footprint_, &segment_, &spread_, &red_, &green_, &blue_, &luminance_,
                       &next_[0], &next_[1], &next_[2], &next_known_})
     if (plane->size() < pixels) plane->resize(pixels);  // what no surface has set is never used but times 0
   known_.assign(pixels, 0.0f);
@@ -82,37 +98,36 @@ void LayeredFilter::begin(uint32_t width, uint32_t height) {
 void LayeredFilter::set(size_t pixel, const LayerPixel& p) {
   x_[pixel] = p.position.x, y_[pixel] = p.position.y, z_[pixel] = p.position.z;
   nx_[pixel] = p.normal.x, ny_[pixel] = p.normal.y, nz_[pixel] = p.normal.z;
-  footprint_[pixel] = p.footprint, segment_[pixel] = std::min(p.segment, kMostLength), error_[pixel] = p.error;
+  footprint_[pixel] = p.footprint, segment_[pixel] = std::min(p.segment, kMostLength), spread_[pixel] = believed(p.error);
   red_[pixel] = p.light.x, green_[pixel] = p.light.y, blue_[pixel] = p.light.z;
   luminance_[pixel] = luminance(p.light);
   known_[pixel] = p.hole ? 0.0f : 1.0f;
   todo_[pixel] = p.hole || p.error > kExact;
 }
 
-/// Adds what `count` pixels from p on get from those from q on. One loop without branches, which compilers turn into
-/// vector instructions.
+/// Adds what `count` pixels from p on get from those from q on.
 void LayeredFilter::tap(size_t p, size_t q, size_t count, float kernel, float reach, float step, Sums& sums) const {
-  const float *x = x_.data(), *y = y_.data(), *z = z_.data(), *nx = nx_.data(), *ny = ny_.data(), *nz = nz_.data();
-  const float *footprint = footprint_.data(), *segment = segment_.data(), *error = error_.data();
-  const float *lum = luminance_.data(), *known = known_.data();
-  const float *red = red_.data(), *green = green_.data(), *blue = blue_.data();
   const float sharpness = 1.0f / step;
-  float *__restrict weights = sums.weight, *__restrict reds = sums.red, *__restrict greens = sums.green,
-                    *__restrict blues = sums.blue;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count; i += kLanes) {
     const size_t a = p + i, b = q + i;
-    const float wx = x[b] - x[a], wy = y[b] - y[a], wz = z[b] - z[a];
-    const float off_a = std::fabs(wx * nx[a] + wy * ny[a] + wz * nz[a]);
-    const float off_b = std::fabs(wx * nx[b] + wy * ny[b] + wz * nz[b]);
-    const float cosine = nx[a] * nx[b] + ny[a] * ny[b] + nz[a] * nz[b];
-    const float stop = normal_weight(cosine) * plane_weight(most(off_a, off_b), footprint[a], footprint[b], reach) *
-                       segment_weight(segment[a], segment[b]);
-    const float light = luminance_weight(lum[a], lum[b], believed(most(error[a], error[b])) * sharpness);
-    const float w = known[b] != 0.0f ? kernel * stop * (known[a] != 0.0f ? light : 1.0f) : 0.0f;
-    weights[i] += w;
-    reds[i] += w * red[b];
-    greens[i] += w * green[b];
-    blues[i] += w * blue[b];
+    const Floats here = kIndices < float(count - i) ? load(&known_[b]) : Floats{};
+    const Floats nax = load(&nx_[a]), nay = load(&ny_[a]), naz = load(&nz_[a]);
+    const Floats nbx = load(&nx_[b]), nby = load(&ny_[b]), nbz = load(&nz_[b]);
+    const Floats x = load(&x_[b]) - load(&x_[a]), y = load(&y_[b]) - load(&y_[a]), z = load(&z_[b]) - load(&z_[a]);
+    const Floats off_a = x * nax + y * nay + z * naz, off_b = x * nbx + y * nby + z * nbz;
+    const Floats stop = normal_weight(nax * nbx + nay * nby + naz * nbz) *
+                        plane_weight(most(most(off_a, -off_a), most(off_b, -off_b)), load(&footprint_[a]),
+                                     load(&footprint_[b]), reach) *
+                        segment_weight(load(&segment_[a]), load(&segment_[b]));
+    const Floats light = luminance_weight(load(&luminance_[a]), load(&luminance_[b]),
+                                          most(load(&spread_[a]), load(&spread_[b])) * sharpness);
+    const Floats w = here * (kernel * stop) * (load(&known_[a]) != 0.0f ? light : Floats{} + 1.0f);
+    const auto add = [&](float* to, Floats value) {
+      const Floats sum = load(to + i) + value;
+      std::memcpy(to + i, &sum, sizeof sum);
+    };
+    add(sums.weight, w);
+    add(sums.red, w * load(&red_[b])), add(sums.green, w * load(&green_[b])), add(sums.blue, w * load(&blue_[b]));
   }
 }
 
@@ -122,7 +137,7 @@ void LayeredFilter::row(int y, int step) {
     const int end = std::min(width, begin + kRun);
     const size_t first = size_t(y) * width_ + size_t(begin);
     if (!std::memchr(todo_.data() + first, 1, size_t(end - begin))) continue;
-    Sums sums;
+    Sums sums = {};
     for (int i = 0; i < end - begin; ++i) {
       const size_t p = first + size_t(i);
       const float w = known_[p] * kKernel[0] * kKernel[0];
@@ -136,10 +151,10 @@ void LayeredFilter::row(int y, int step) {
         if (!dx && !dy) continue;
         const int from = std::max(begin, -dx * step), to = std::min(end, width - dx * step);
         if (from >= to) continue;
-        Sums part;  // begins at `from`
         const bool whole = from == begin;
+        Sums part;  // begins at `from`
+        if (!whole) part = Sums{};
         Sums& into = whole ? sums : part;
-        if (!whole) std::memset(&part, 0, sizeof part);
         tap(size_t(y) * width_ + size_t(from), size_t(j) * width_ + size_t(from + dx * step), size_t(to - from),
             kKernel[std::abs(dx)] * kKernel[std::abs(dy)], float(step * std::max(std::abs(dx), std::abs(dy))),
             float(step), into);
