@@ -22,8 +22,8 @@ constexpr float kSegment = 2.0f;      // s_d'
 constexpr float kLuminance = 3.0f;    // s_l, as the paper has it
 
 constexpr float kMostLength = 1e30f;
-constexpr float kTiny = 1e-35f;       // keeps 0 / 0 from being asked
-constexpr int kRun = 64;              // pixels of a row at a time
+constexpr float kTiny = 1e-35f;  // keeps 0 / 0 from being asked
+constexpr int kRun = 64;         // pixels of a row at a time
 
 /// How far luminances may differ. Faster than the error itself, so that the filter is gone when it would blur more than
 /// it smooths.
@@ -88,8 +88,8 @@ struct LayeredFilter::Sums {
 void LayeredFilter::begin(uint32_t width, uint32_t height) {
   width_ = width, height_ = height;
   const size_t pixels = size_t(width) * height + kLanes;  // eight are read at once, the last ones, too
-  for (auto* plane : {&x_, &y_, &z_, &nx_, &ny_, &nz_, &footprint_, &segment_, &spread_, &red_, &green_, &blue_, &luminance_,
-                      &next_[0], &next_[1], &next_[2], &next_known_})
+  for (auto* plane : {&x_, &y_, &z_, &nx_, &ny_, &nz_, &footprint_, &segment_, &spread_, &red_, &green_, &blue_,
+                      &luminance_, &next_[0], &next_[1], &next_[2], &next_known_})
     if (plane->size() < pixels) plane->resize(pixels);  // what no surface has set is never used but times 0
   known_.assign(pixels, 0.0f);
   todo_.assign(pixels, 0);
@@ -98,7 +98,8 @@ void LayeredFilter::begin(uint32_t width, uint32_t height) {
 void LayeredFilter::set(size_t pixel, const LayerPixel& p) {
   x_[pixel] = p.position.x, y_[pixel] = p.position.y, z_[pixel] = p.position.z;
   nx_[pixel] = p.normal.x, ny_[pixel] = p.normal.y, nz_[pixel] = p.normal.z;
-  footprint_[pixel] = p.footprint, segment_[pixel] = std::min(p.segment, kMostLength), spread_[pixel] = believed(p.error);
+  footprint_[pixel] = p.footprint, segment_[pixel] = std::min(p.segment, kMostLength),
+  spread_[pixel] = believed(p.error);
   red_[pixel] = p.light.x, green_[pixel] = p.light.y, blue_[pixel] = p.light.z;
   luminance_[pixel] = luminance(p.light);
   known_[pixel] = p.hole ? 0.0f : 1.0f;

@@ -46,10 +46,10 @@ class LayeredFilter {
 
   uint32_t width_ = 0, height_ = 0;
   std::vector<float> x_, y_, z_, nx_, ny_, nz_, footprint_, segment_, red_, green_, blue_, luminance_;
-  std::vector<float> spread_;                         // how far luminances may differ, relative
-  std::vector<float> known_;                          // 1: light stands there, 0: none
-  std::vector<float> next_[3], next_known_;           // of the pass that runs
-  std::vector<uint8_t> todo_;                         // to be filtered
+  std::vector<float> spread_;                // how far luminances may differ, relative
+  std::vector<float> known_;                 // 1: light stands there, 0: none
+  std::vector<float> next_[3], next_known_;  // of the pass that runs
+  std::vector<uint8_t> todo_;                // to be filtered
 };
 
 }  // namespace afterglow

@@ -43,8 +43,8 @@ std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, ui
         }
       if (!(near.weight > 0.0f)) continue;
       const float mean = near.sum / near.weight;
-      const float variance = near.known > 0.0f ? near.variance / near.known
-                                               : std::max(0.0f, near.mean_square / near.weight - mean * mean);
+      const float variance =
+          near.known > 0.0f ? near.variance / near.known : std::max(0.0f, near.mean_square / near.weight - mean * mean);
       deviations[size_t(y) * width + size_t(x)] = std::sqrt(variance / (mean * mean + floor));
     }
   return deviations;
@@ -96,7 +96,8 @@ std::vector<PixelRequest> extra_requests(const Film& film, float extra) {
     for (uint32_t x = f.x0; x < f.x1; ++x) {
       const size_t p = size_t(y - f.y0) * film.width() + (x - f.x0);
       if (counts[p])
-        requests.push_back({.x = uint16_t(x), .y = uint16_t(y), .first = pixels[p].extra, .count = counts[p], .extra = true});
+        requests.push_back(
+            {.x = uint16_t(x), .y = uint16_t(y), .first = pixels[p].extra, .count = counts[p], .extra = true});
     }
   return requests;
 }

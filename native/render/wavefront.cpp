@@ -168,8 +168,8 @@ void filter_layers(std::span<const PixelRequest> requests, Wavefront& wave, cons
         if (wave.layers[i] != layer) continue;
         const CachePoint& p = wave.points[i];
         const Answer& a = wave.answers[i];
-        wave.filter.set(box.index(p), {p.position, p.normal, p.footprint, p.segment, a.relative_error, a.light,
-                                       !(a.weight > 0.0f)});
+        wave.filter.set(box.index(p),
+                        {p.position, p.normal, p.footprint, p.segment, a.relative_error, a.light, !(a.weight > 0.0f)});
       }
     });
     wave.filter.run(work.threads, work.stop);
@@ -275,8 +275,7 @@ WalkKernel choose_walk_kernel(const Effects& effects, PassSet passes, bool local
 }
 
 void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std::span<const PixelRequest> all,
-                       Film& film, Work& work, const WalkSettings& settings, WavefrontTimes& times,
-                       Wavefront& wave) {
+                       Film& film, Work& work, const WalkSettings& settings, WavefrontTimes& times, Wavefront& wave) {
   const CameraRays camera(scene.scene.camera(), scene.scene.origin(), film.settings().width, film.settings().height);
   const path_tracing::KernelInput input{.walk = {scene, settings.limits, work.shown, film.layout()[Pass::kUv] >= 0},
                                         .camera = camera,
@@ -304,11 +303,11 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
     uint64_t samples = 0;
     do samples += sample_count(requests[end++]);
     while (end < requests.size() && samples + sample_count(requests[end]) <= kMostSamples &&
-           end - begin < kMostRequests &&
-           (!apart || requests[end].first == requests[begin].first));
+           end - begin < kMostRequests && (!apart || requests[end].first == requests[begin].first));
     const std::span<const PixelRequest> part(requests.data() + begin, end - begin);
     begin = end;
-    walk(input, kernel, part, traits.lights, film.keeps_noise(), wave, work, times);
+    walk(input, kernel, part, work.extra ? std::min(1u, traits.lights) : traits.lights, film.keeps_noise(), wave, work,
+         times);
     if (work.stop.stop()) return;
     answer(method, scene, wave, work, times);
     if (work.stop.stop()) return;

@@ -28,7 +28,7 @@ struct WalkedRequest {
   std::vector<CachePoint> points;
   std::vector<Question> questions;  // one a point
   RayCounts counts;
-  uint32_t lights = 1;  // samples of the light sources at a first surface
+  uint32_t lights = 1;               // samples of the light sources at a first surface
   bool noise = false, done = false;  // luminances are wanted; it was not stopped
   /// Empty again, with the memory that it has.
   void clear(uint32_t wanted_lights, bool wanted_noise) {

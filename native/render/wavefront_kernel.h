@@ -30,6 +30,7 @@ class AskingVisitor : public path_tracing::FilmVisitor<kPasses> {
 
   /// More where more of the light reaches the picture.
   uint32_t lights(const PathState& path) const {
+    if (!out_.lights) return 0;
     return glm::max(1u, uint32_t(std::lround(float(out_.lights) * glm::min(1.0f, max_component(path.throughput)))));
   }
 

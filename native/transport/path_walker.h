@@ -12,7 +12,7 @@
 //   void held_out(const PathState&, float share)             a holdout seen from the camera
 // A visitor that names a type SplitsDiffuse is also told
 //   void diffuse(const PathState&, const SurfacePoint&, const Surface& diffuse_lobes)
-//   uint32_t lights(const PathState&)         how many times light sources are asked here
+//   uint32_t lights(const PathState&)         how many times light sources are asked here; 0: by other lobes alone
 // and answers for the light that other surfaces send there: the walk goes on through the other lobes alone, and the
 // light sources that it looks for are not weighed against diffuse directions that are never taken.
 // A visitor that names a type MayAnswer is asked at each vertex, after surface(), whether it has done so:
@@ -375,6 +375,11 @@ class Walker {
   void ask_lights(const PathState& path, const SurfacePoint& point, const Surface& surface, const Surface& diffuse,
                   float scatter_share, float u_light, const Vec2& u, Visitor& visitor) const {
     const uint32_t count = visitor.lights(path);
+    if (!count) {  // the visitor knows the diffuse lobes' direct light as well
+      Surface none;
+      if (surface.count) look_for_light(path, point, surface, &none, scatter_share, u_light, u, visitor);
+      return;
+    }
     const float share = 1.0f / float(count);
     const auto fraction = [](float x) { return std::fmin(x - std::floor(x), 0x1.fffffep-1f); };
     for (uint32_t k = 0; k < count; ++k) {

@@ -123,12 +123,47 @@ def test_more_light_samples_change_no_mean_and_less_noise() -> None:
     truth = direct(samples=1024, method="PATH_TRACING", seed=8)
     errors = {}
     for lights in (1, 8):
-        images = [direct(samples=4, hash_lights=lights, seed=s, **HASH) for s in range(6)]
+        images = [direct(samples=4, hash_lights=lights, hash_extra=0.0, seed=s, **HASH) for s in range(6)]
         means = [float(image.mean()) for image in images]
         here = Mean(float(np.mean(means)), float(np.std(means, ddof=1) / 6**0.5))
         agree(here, Mean(float(truth.mean()), 0.002 * float(truth.mean())), tolerance=0.005)
         errors[lights] = float(np.median([np.median((image - truth) ** 2) for image in images]))
     assert errors[8] < 0.7 * errors[1]
+
+
+def test_extra_samples_go_where_noise_is_and_change_no_mean() -> None:
+    """Their number is what was asked for, edges get most, and the picture's mean stays within half a per cent."""
+    scene, size = cornell_box("glossy"), 32
+    settings: dict[str, Any] = dict(size=size, diffuse_bounces=4, caustics_reflective=False, passes=["combined", "sample_count"])
+    truth = [render(scene, method="PATH_TRACING", samples=1024, seed=s, **settings).image[..., :3].astype(np.float64)
+             for s in range(2)]
+    means, errors = {}, {}
+    for extra in (0.0, 2.0):
+        results = [render(scene, samples=8, seed=s, hash_extra=extra, **HASH, **settings) for s in range(8)]
+        counts = results[0].passes["sample_count"]
+        assert counts.min() >= 8 and abs(counts.mean() / (8 * (1 + extra)) - 1) < 0.03
+        assert extra == 0 or counts.max() > 4 * np.median(counts)
+        images = [r.image[..., :3].astype(np.float64) for r in results]
+        values = [image.mean() for image in images]
+        means[extra] = Mean(float(np.mean(values)), float(np.std(values, ddof=1) / 8**0.5))
+        errors[extra] = float(np.mean([((x - truth[0]) * (x - truth[1])).mean() for x in images]))
+    agree(means[2.0], Mean(float(np.mean(truth)), 0.001 * float(np.mean(truth))), tolerance=0.005)
+    agree(means[2.0], means[0.0], tolerance=0.005)
+    assert errors[2.0] < 0.5 * errors[0.0]
+
+
+@pytest.mark.parametrize("variant", ["diffuse", "glossy", "emissive"])
+def test_all_from_the_cache_has_the_same_light(variant: str) -> None:
+    scene = cornell_box(variant)
+    settings: dict[str, Any] = dict(size=16, diffuse_bounces=4, caustics_reflective=False, caustics_refractive=False)
+    truth = [render(scene, method="PATH_TRACING", samples=128, seed=i, **settings).image[..., :3].mean(dtype=np.float64)
+             for i in range(4)]
+    results = [render(scene, samples=32, seed=i, hash_direct=True, **HASH, **settings) for i in range(6)]
+    found = [r.image[..., :3].mean(dtype=np.float64) for r in results]
+    agree(Mean(float(np.mean(found)), float(np.std(found, ddof=1) / 6**0.5)),
+          Mean(float(np.mean(truth)), float(np.std(truth, ddof=1) / 2)), tolerance=0.01)
+    if variant == "diffuse":
+        assert results[0].statistics["rays"]["shadow"] == 0
 
 
 def test_the_picture_of_a_still_view_goes_on() -> None:

@@ -14,8 +14,8 @@ namespace {
 constexpr float kFarthest = 0.04f;  // of the ray's length: how far look-ups may be scattered beyond the asked jitter
 constexpr float kEnough = 0.01f;    // share of the light that the levels above need not bring
 
-constexpr uint32_t kEven = 1024;    // samples from which on a cell shows no blotches
-constexpr size_t kGroup = 32;       // questions whose cells are fetched from memory together
+constexpr uint32_t kEven = 1024;  // samples from which on a cell shows no blotches
+constexpr size_t kGroup = 32;     // questions whose cells are fetched from memory together
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -107,7 +107,7 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
     }
   });
   std::array<std::vector<CachePoint>, 3> slices;  // the first few fill cells in which the others end
-  std::vector<uint32_t> rest;  // without a path, and their own cell is empty
+  std::vector<uint32_t> rest;                     // without a path, and their own cell is empty
   for (size_t i = 0; i < points.size(); ++i) {
     const float u = unit_float(hash(hash_of(points[i], seed_), points[i].sample, 1));
     if (u < shares[i])
@@ -149,7 +149,8 @@ Cache::LookUp Cache::first_look(const CachePoint& p) const {
   LookUp look;
   look.owner = owner_of(p.instance, p.face_normal);
   const uint32_t random = hash(hash_of(p, seed_), p.sample, 2), second = hash(random);
-  look.level = std::min(int(grid_.level(p.footprint * settings_.caching.cell_pixels) + unit_float(hash(second))), kTopLevel);
+  look.level =
+      std::min(int(grid_.level(p.footprint * settings_.caching.cell_pixels) + unit_float(hash(second))), kTopLevel);
   if (settings_.jitter > 0.0f) {
     const Frame frame(p.face_normal);
     look.offset = settings_.jitter *

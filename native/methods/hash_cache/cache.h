@@ -16,7 +16,7 @@ struct CacheSettings {
   float resolution = 1.0f;  // share of the questions that send a path (the caching resolution factor, squared)
   float jitter = 0.5f;      // of look-ups, in cell widths (s_j)
   float trusted = 32.0f;    // samples from which on a cell answers alone
-  float enough = 512.0f;    // samples from which on a cell gets paths more rarely
+  float enough = 128.0f;    // samples from which on a cell gets paths more rarely
   uint32_t keep = 0;        // samples that a cell keeps when the scene changes; 0: starts anew
   size_t limit = size_t(1) << 30;
   View view = View::kLight;

@@ -67,6 +67,9 @@ class StoringVisitor {
     context = first.counts;
   }
 
+  /// Light that the asking point gets from a light source.
+  void add_direct(const Rgb& light) { stored_[0].light += light; }
+
   std::span<const Stored> stored() const { return {stored_, count_}; }
 
   void traced(const Ray&, bool) {}
@@ -102,7 +105,8 @@ class StoringVisitor {
   /// A vertex's own direct light is looked for where the picture is made.
   void emitted(const PathState&, const Rgb& light) {
     for (uint32_t i = 0; i < count_; ++i)
-      if (Stored& s = stored_[i]; s.live && s.counts.depth > 1 + s.before) s.light += s.throughput * light;
+      if (Stored& s = stored_[i]; s.live && s.counts.depth > (i || !in_.settings.direct ? 1 : 0) + s.before)
+        s.light += s.throughput * light;
   }
   void escaped(const PathState& path, const Rgb& light) {
     if (!is_black(light)) emitted(path, light);
@@ -198,6 +202,23 @@ SurfacePoint start_of(const CachePoint& p) {
   return point;
 }
 
+/// What the light sources send to the point that asks: irradiance / pi, weighed against the direction that is taken.
+template <uint32_t kFeatures>
+Rgb direct_light(const PathInput& in, const CachePoint& p, float u_light, const Vec2& u, RayCounts& counts) {
+  LightSample light;
+  if (!in.walk.scene.lights.sample(p.position, p.normal, u_light, u, light)) return Rgb(0.0f);
+  const float density = glm::dot(p.normal, light.direction) * kInvPi;
+  if (!(density > 0.0f) || !(glm::dot(p.face_normal, light.direction) > 0.0f)) return Rgb(0.0f);
+  if (!(light.visibility & kVisibleDiffuse)) return Rgb(0.0f);
+  const float weight = light.delta ? 1.0f : power_heuristic(light.density, density);
+  const Rgb arriving = light.radiance * (density * weight / light.density);
+  if (!light.cast_shadow) return arriving;
+  const Ray ray = shadow_ray(start_of(p), light);
+  counts.shadow++;
+  if constexpr (kFeatures & kFeatureStraight) return arriving * transmittance(in.walk, ray, PathContext{}, counts);
+  return in.walk.scene.rays.occluded(ray) ? Rgb(0.0f) : arriving;
+}
+
 template <uint32_t kFeatures>
 void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<Sample>& out, RayCounts& counts) {
   const Walker<kFeatures> walker(in.walk, counts);
@@ -209,7 +230,12 @@ void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<
     visitor.begin(p, path.context);
     const float radius = std::sqrt(u.x), phi = 2.0f * kPi * u.y, z = std::sqrt(std::fmax(0.0f, 1.0f - u.x));
     const Vec3 direction = Frame(p.normal).to_world({radius * std::cos(phi), radius * std::sin(phi), z});
-    if (z > 0.0f && glm::dot(direction, p.face_normal) > 0.0f && !visitor.stored()[0].last) {
+    const bool last = visitor.stored()[0].last;
+    if (in.settings.direct)
+      visitor.add_direct(
+          direct_light<kFeatures>(in, p, unit_float(hash(hash_of(p, in.seed), p.sample, 4)), sampler.next2(), counts));
+    if (z > 0.0f && glm::dot(direction, p.face_normal) > 0.0f && (!last || in.settings.direct)) {
+      path.last = last;
       path.density = z * kInvPi;
       path.position = p.position, path.light_normal = p.normal;
       path.ray.origin = offset_origin(start_of(p), direction);
@@ -241,9 +267,9 @@ void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<
 
 bool CachingSettings::operator==(const CachingSettings& o) const {
   const WalkLimits &a = walk.limits, &b = o.walk.limits;
-  return store == o.store && length == o.length && cell_pixels == o.cell_pixels && long_paths == o.long_paths &&
-         a.max_bounces == b.max_bounces && a.diffuse == b.diffuse && a.glossy == b.glossy &&
-         a.transmission == b.transmission && a.transparent == b.transparent &&
+  return store == o.store && direct == o.direct && length == o.length && cell_pixels == o.cell_pixels &&
+         long_paths == o.long_paths && a.max_bounces == b.max_bounces && a.diffuse == b.diffuse &&
+         a.glossy == b.glossy && a.transmission == b.transmission && a.transparent == b.transparent &&
          a.caustics_reflective == b.caustics_reflective && a.caustics_refractive == b.caustics_refractive &&
          walk.clamp_indirect == o.walk.clamp_indirect;
 }

@@ -44,9 +44,11 @@ inline uint64_t mix(uint64_t x) {
 /// 64 bits that stand for the whole cell: with 10^8 cells, two of them share a key with a chance of 3e-4 in all.
 /// Never 0, which means an empty slot.
 inline uint64_t key_of(const Cell& c) {
-  uint64_t h = mix(uint64_t(uint32_t(c.x)) | uint64_t(uint32_t(c.y)) << 32);
-  h = mix(h + (uint64_t(uint32_t(c.z)) | uint64_t(c.owner) << 32));
-  h = mix(h + c.level + 0x9e3779b97f4a7c15u);
+  const uint64_t place = uint64_t(uint32_t(c.x)) | uint64_t(uint32_t(c.y)) << 32;
+  const uint64_t rest = (uint64_t(uint32_t(c.z)) | uint64_t(c.owner) << 32) + (c.level + 1) * 0x9e3779b97f4a7c15u;
+  // Both halves of a product of 128 bits depend on all bits of both words (Yi 2019, "wyhash").
+  const unsigned __int128 product = (unsigned __int128)(place ^ 0xa0761d6478bd642fu) * (mix(rest) | 1);
+  const uint64_t h = mix(uint64_t(product) ^ uint64_t(product >> 64));
   return h ? h : 1;
 }
 

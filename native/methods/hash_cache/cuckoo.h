@@ -23,6 +23,13 @@ class CuckooMap {
   static constexpr uint32_t kSlots = 4;
   /// Keys must differ; none may be 0xffffffff. Slots: `usage` times the keys, and 1 % more after each failure.
   void build(std::span<const Block> blocks, double usage = 1.1);
+  /// Asks for the memory in which find(key) will look first.
+  void prefetch(uint32_t key) const {
+    if (keys_.empty()) return;
+    const uint32_t b = bucket(key, 0);
+    __builtin_prefetch(&keys_[b]);
+    __builtin_prefetch(&values_[size_t(b) * kSlots]);
+  }
   const Block* find(uint32_t key) const {
     if (keys_.empty()) return nullptr;
     for (uint32_t k = 0; k < 2; ++k) {

@@ -9,8 +9,8 @@ namespace afterglow::hash_cache {
 
 namespace {
 
-constexpr uint32_t kLights = 4;
-constexpr float kExtra = 1.0f;
+constexpr uint32_t kLights = 2;
+constexpr float kExtra = 2.0f;
 constexpr const char* kViews[] = {"LIGHT", "LEVEL", "COUNT", "AGE", "SIDE"};
 
 View view_of(const SettingValue& value) {
@@ -24,7 +24,7 @@ View view_of(const SettingValue& value) {
 class HashCache final : public IndirectMethod {
  public:
   MethodTraits traits() const override {
-    return {.layers = filter_, .running = running_, .lights = lights_, .extra = extra_};
+    return {.layers = filter_, .running = running_, .lights = direct_ ? 0u : lights_, .extra = extra_};
   }
 
   void configure(const Settings& settings) override {
@@ -33,6 +33,7 @@ class HashCache final : public IndirectMethod {
     running_ = true;
     lights_ = kLights;
     extra_ = kExtra;
+    direct_ = false;
     s.caching.walk.configure(settings);
     bool denoised = false;
     for (const auto& [name, value] : settings) {
@@ -49,6 +50,7 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_enough") s.enough = float(number_of(value));
       if (name == "hash_running") running_ = integer_of(value) != 0;
       if (name == "hash_lights") lights_ = uint32_t(integer_of(value));
+      if (name == "hash_direct") s.caching.direct = direct_ = integer_of(value) != 0;
       if (name == "hash_extra") extra_ = float(number_of(value));
       if (name == "hash_long_paths") s.caching.long_paths = float(number_of(value));
       if (name == "hash_view") s.view = view_of(value);
@@ -93,7 +95,7 @@ class HashCache final : public IndirectMethod {
 
  private:
   Cache cache_;
-  bool filter_ = true, running_ = true;
+  bool filter_ = true, running_ = true, direct_ = false;
   uint32_t lights_ = kLights;
   float extra_ = kExtra;
 };
@@ -118,8 +120,12 @@ MethodDescription describe() {
       "", 0.125, 0.01, 1.0);
   add("hash_lights", "Light Samples", "Times that light sources are asked at the surface that a pixel shows", "",
       int64_t(kLights), 1.0, 64.0);
+  add("hash_direct", "All from the Cache",
+      "The light of light sources on diffuse surfaces comes from the cells, too: fewer rays, blurred shadows", "",
+      false, 0.0, 1.0);
   add("hash_extra", "Extra Camera Samples",
-      "Samples beyond every pixel's own, for each of those one on average, that go where the picture is noisy: edges, gloss",
+      "Samples beyond every pixel's own, for each of those one on average, that go where the picture is noisy: edges, "
+      "gloss",
       "", double(kExtra), 0.0, 16.0);
   add("hash_resolution", "Caching Resolution",
       "Paths that fill the cache, as a share of the image's width and height; what no cell answers is filled anyway",

@@ -12,7 +12,7 @@ namespace {
 
 using KeyIndex = std::pair<uint64_t, uint32_t>;
 constexpr size_t kBlock = 4096;
-constexpr size_t kFullest = 13, kOf = 16;  // slots that may be taken, in sixteenths
+constexpr size_t kFullest = 10, kOf = 16;  // slots that may be taken, in sixteenths
 
 /// Keys and indices of the samples, grouped by the keys' first byte and in the samples' order within each group.
 std::vector<KeyIndex> grouped(std::span<const Sample> samples, unsigned threads,
