@@ -178,7 +178,8 @@ def reference(renderer: Renderer, samples: int, say: Callable[[str], None]) -> t
 
 def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, repeats: int, budget: float,
             say: Callable[[str], None], begin: Callable[[int, Setting], None] = lambda number, setting: None) -> list[Point]:
-    """Every setting `repeats` times with another seed; a method's dearer settings are left out once one took over `budget` s.
+    """Every setting `repeats` times with another seed. A method's settings that would take more than `budget` s by what the last
+    one took are left out; what takes longer all the same is cut there, and its point says so.
     begin: called with the number of each setting before it is rendered."""
     whole, points, spent = parts.mean(0), [], {}
     for number, setting in enumerate(settings):
@@ -192,7 +193,7 @@ def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, 
             continue
         errors, bars, seconds, shown, statistics = [], [], [], None, {}
         for repeat in range(repeats):
-            image, took, statistics = renderer.render(method=method, seed=repeat, **values)
+            image, took, statistics = renderer.render(method=method, seed=repeat, time_limit=budget, **values)
             estimate = metrics.halves_relmse(image, list(parts))
             errors.append(estimate.value)
             bars.append(estimate.error)
@@ -202,8 +203,9 @@ def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, 
         spent[setting.method] = (min(seconds), (statistics.get("seconds") or {}).get("render", min(seconds)), effort)
         spread = float(np.std(errors, ddof=1) / math.sqrt(repeats)) if repeats > 1 else 0.0
         assert shown is not None
+        name = setting.name + (", cut" if statistics.get("elapsed", 0.0) >= budget else "")
         points.append(Point(
-            setting.method, setting.name, float(np.median(seconds)), float(np.mean(errors)),
+            setting.method, name, float(np.median(seconds)), float(np.mean(errors)),
             math.hypot(spread, float(np.mean(bars))),
             metrics.trimmed_relmse(shown, whole), metrics.ms_ssim(shown, whole) if min(shown.shape[:2]) >= 11 else float("nan"),
             metrics.flip(shown, whole), statistics.get("believed_error"), statistics.get("noise"),
@@ -257,7 +259,7 @@ def line_name(point: Point) -> str:
 
 def label(point: Point) -> str:
     """A point's setting in few letters."""
-    return f"{point.accuracy:g}" if point.accuracy > 0 else point.setting
+    return point.setting.removeprefix("accuracy ")
 
 
 def to_svg(report: Report) -> str:
