@@ -4,6 +4,8 @@
 import bpy
 from bl_operators.presets import AddPresetBase
 
+from ..properties.scene import LIGHT_PATHS
+
 # Quality → settings of the final render and of the viewport.
 QUALITIES = {
     "DRAFT": dict(accuracy=0.2, samples=64, preview_accuracy=0.1),
@@ -24,15 +26,7 @@ FROM_CYCLES = (
     "samples",
     "seed",
     "use_animated_seed",
-    "max_bounces",
-    "diffuse_bounces",
-    "glossy_bounces",
-    "transmission_bounces",
-    "transparent_max_bounces",
-    "sample_clamp_direct",
-    "sample_clamp_indirect",
-    "caustics_reflective",
-    "caustics_refractive",
+    *LIGHT_PATHS,
     "film_exposure",
     "pixel_filter_type",
     "filter_width",
@@ -97,15 +91,7 @@ class AFTERGLOW_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):
             "samples",
             "time_limit",
             "seed",
-            "max_bounces",
-            "diffuse_bounces",
-            "glossy_bounces",
-            "transmission_bounces",
-            "transparent_max_bounces",
-            "sample_clamp_direct",
-            "sample_clamp_indirect",
-            "caustics_reflective",
-            "caustics_refractive",
+            *LIGHT_PATHS,
             "denoise",
             "preview_accuracy",
             "preview_samples",

@@ -150,7 +150,8 @@ SHARED_SETTINGS = set(AfterglowSceneSettings.__annotations__) | {
     "passes",
 }
 
-_SESSION_NAMES = (
+# How far light is followed and what of it is cut, by Cycles' names.
+LIGHT_PATHS = (
     "max_bounces",
     "diffuse_bounces",
     "glossy_bounces",
@@ -160,9 +161,8 @@ _SESSION_NAMES = (
     "sample_clamp_indirect",
     "caustics_reflective",
     "caustics_refractive",
-    "film_exposure",
-    "filter_width",
 )
+_SESSION_NAMES = (*LIGHT_PATHS, "film_exposure", "filter_width")
 
 
 def session_settings(scene: bpy.types.Scene, viewport: bool) -> dict[str, Any]:
