@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from afterglow import metrics, scenes
 from afterglow.scenes.native import Built
+from hard_cases import ball_under_sky
 
 SIZE = 72
 GUIDES = ("combined", "albedo", "denoise_normal")
@@ -153,7 +154,7 @@ def test_a_viewport_is_denoised(copies: list[str], truth: np.ndarray) -> None:
 
 def test_cancel_while_denoising(copies: list[str]) -> None:
     """Within 50 ms, though the library asks only between its layers; the next render is denoised all the same."""
-    built = Built(scenes.make("furnace"))
+    built = Built(ball_under_sky())
     taken = []
     for delay in (0.0, 0.02, 0.05):
         running = session(built, copies, 1600, 900, samples=1, max_bounces=0)
