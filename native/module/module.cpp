@@ -10,7 +10,9 @@ namespace {
 /// A Python exception class below `base` and, where given, a builtin, so that `except ValueError` works, too.
 py::object new_exception(py::module_& m, const char* name, const py::object& base, PyObject* builtin = nullptr) {
   const std::string full = std::string("afterglow.") + name;
-  py::tuple bases = builtin ? py::make_tuple(base, py::reinterpret_borrow<py::object>(builtin)) : py::make_tuple(base);
+  // Tuples of one and of two have types of their own since pybind11 3.
+  py::tuple bases = py::make_tuple(base);
+  if (builtin) bases = py::make_tuple(base, py::reinterpret_borrow<py::object>(builtin));
   PyObject* type = PyErr_NewException(full.c_str(), bases.ptr(), nullptr);
   if (!type) throw py::error_already_set();
   m.attr(name) = py::reinterpret_borrow<py::object>(type);

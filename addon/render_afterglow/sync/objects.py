@@ -45,6 +45,7 @@ class MeshEntry:
     handle: int | None          # None: nothing to see
     key: GroupKey               # of the first group that showed it
     address: int
+    original_data: int          # as in MeshUse
     fingerprint: tuple[int, ...]
     names: frozenset[str]       # attributes that it has and that were asked for
     topology: int | None = None     # checksums, made when it is read a second time
@@ -275,11 +276,13 @@ class ObjectTable:
     def _update_meshes(self) -> dict[int, MeshEntry]:
         """The mesh at each address that the walk has met: as it was, read anew, or new."""
         # Another depsgraph may have another mesh at the same address: what everything is read for goes by its users.
-        by_address = {} if self.updates.everything else {entry.address: entry for entry in self.meshes.values()}
+        entries = () if self.updates.everything else self.meshes.values()
+        by_address = {(entry.address, entry.original_data): entry for entry in entries}
+        at_place = {address: by_address.get((address, use.original_data)) for address, use in self.uses.items()}
         result: dict[int, MeshEntry] = {}
-        claimed = {id(by_address[address]) for address in self.uses if address in by_address}
+        claimed = {id(entry) for entry in at_place.values() if entry is not None}
         for address, use in self.uses.items():
-            known = by_address.get(address)
+            known = at_place[address]
             names = self._names(use)
             if known is not None and self._is_clean(known, use, names):
                 known.key = use.key
@@ -307,7 +310,7 @@ class ObjectTable:
                          or name in attributes)
 
     def _read_mesh(self, use: MeshUse, address: int, names: frozenset[str], known: MeshEntry | None) -> MeshEntry:
-        entry = MeshEntry(known.handle if known else None, use.key, address, fingerprint_of(use), names)
+        entry = MeshEntry(known.handle if known else None, use.key, address, use.original_data, fingerprint_of(use), names)
         arguments = None
         try:
             mesh = use.data if use.maker is None else use.maker.to_mesh()

@@ -44,8 +44,8 @@ def generation(kind: str) -> int:
 
 
 def bump_shadowing() -> str:
-    """How light at grazing angles fades on bent normals (measured: 4.2 the old way, 4.5 the new)."""
-    return "chiang" if bpy.app.version < (4, 3, 0) else "conty"
+    """How light at grazing angles fades on bent normals (measured: 4.3 the old way, 4.5 the new)."""
+    return "chiang" if bpy.app.version < (4, 5, 0) else "conty"
 
 
 def principled_node(compiler: Compiler, view: NodeView) -> Outputs:
