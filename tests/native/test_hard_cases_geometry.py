@@ -242,7 +242,8 @@ def test_sheets_in_one_plane_do_not_turn_black_or_bright() -> None:
         assert abs(value - 0.8) < 0.012 + 4 * error, gap
 
 
-def test_ten_thousand_instances() -> None:
+def ten_thousand_instances() -> tuple[Built, np.ndarray]:
+    """A hundred by a hundred balls, and their matrices."""
     scene = Description("instances", Camera(look_at((0, -60, 40), (0, 0, 0)), 1.2))
     scene.materials["m"] = diffuse((0.6, 0.6, 0.6))
     scene.world = background((1, 1, 1))
@@ -250,9 +251,23 @@ def test_ten_thousand_instances() -> None:
     places = np.tile(np.eye(4), (10000, 1, 1))
     places[:, 0, 3], places[:, 1, 3] = x.ravel(), y.ravel()
     scene.add("Ball", sphere(0.4, 12, 6), "m", transform=places)
-    built = Built(scene)
+    return Built(scene), places
+
+
+def test_ten_thousand_instances() -> None:
+    built, places = ten_thousand_instances()
     assert render(built, samples=4).image[..., :3].mean() > 0.1
     assert sum(built.scene.bytes.values()) < 64e6
+    places[:, 2, 3] = 100.0  # behind the camera
+    built.scene.set_transforms(built.instances["Ball"], places)
+    built.scene.commit()
+    assert render(built, samples=4).image[..., :3].mean() > 0.99
+
+
+@pytest.mark.timing
+def test_ten_thousand_instances_move_at_once() -> None:
+    built, places = ten_thousand_instances()
+    built.scene.commit()
     places[:, 2, 3] = 1.0
     built.scene.set_transforms(built.instances["Ball"], places)
     assert built.scene.commit()["seconds"] < 1.0
