@@ -14,6 +14,7 @@ Convenience targets: each sets up what it needs (Debian packages through tools/s
 Rendering
   make demo         Render blend_files/cornell_box.blend in Blender: build/demo/cornell_box.png.
                     FILE=path.blend   another file          SAMPLES=n   at most n samples
+                    SECONDS=n         for n seconds at most (300; 0: as long as the file's accuracy takes)
   build/blender …   Blender with the add-on enabled; your settings stay untouched. BLENDER=path: another Blender (for
                     Blender's own builds `make package` first: they need the module made for them).
 
@@ -51,6 +52,7 @@ PYTEST_ARGS ?=
 NAME ?=
 FIGURE ?=
 SAMPLES ?=
+SECONDS ?=
 
 # The distribution's Python is the one that its Blender runs; the first on PATH may be another.
 PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
@@ -89,7 +91,7 @@ build/blender: | build/.keep
 demo:
 	@tools/setup.sh demo
 	@$(MAKE) --no-print-directory build
-	@$(PYTHON) tools/demo.py "$(FILE)" $(if $(SAMPLES),--samples $(SAMPLES))
+	@$(PYTHON) tools/demo.py "$(FILE)" $(if $(SAMPLES),--samples $(SAMPLES)) $(if $(SECONDS),--seconds $(SECONDS))
 
 test:
 	@tools/setup.sh test
