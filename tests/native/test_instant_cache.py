@@ -204,6 +204,11 @@ def test_records_equal_fresh_ones_after_random_edits(seed: int) -> None:
     run_edits(150, seed)
 
 
+def test_lights_that_fill_no_whole_word_are_kept_apart() -> None:
+    """Visibility is kept in words of 64 lights: bits beyond the last light are nobody's."""
+    run_edits(60, 3, width=8, height=8, virtual_lights=37)
+
+
 @pytest.mark.slow
 def test_records_equal_fresh_ones_after_ten_thousand_edits() -> None:
     run_edits(10_000, 3, width=8, height=8, virtual_lights=32)

@@ -80,7 +80,7 @@ void VisibilityTable::add_row() {
   seen_.resize(rows_ * words_, 0);
   facing_.resize(rows_ * words_, ~uint64_t(0));
   unknown_.resize(rows_ * words_, ~uint64_t(0));
-  if (slots_ % 64 && words_) unknown_.back() = (uint64_t(1) << (slots_ % 64)) - 1;
+  if (slots_ % 64 && words_) unknown_.back() = facing_.back() = (uint64_t(1) << (slots_ % 64)) - 1;
   if (coloured_) transmittance_.resize(rows_ * slots_, 0);
 }
 
@@ -141,7 +141,7 @@ void VisibilityTable::read(size_t rows, const char* from) {
   if (coloured_) take(transmittance_, rows_ * slots_);
   if (slots_ % 64)
     for (size_t row = 0; row < rows_; ++row)  // no bit beyond the slots, whatever the file says
-      for (std::vector<uint64_t>* bits : {&seen_, &unknown_})
+      for (std::vector<uint64_t>* bits : {&seen_, &unknown_, &facing_})
         (*bits)[(row + 1) * words_ - 1] &= (uint64_t(1) << (slots_ % 64)) - 1;
 }
 
