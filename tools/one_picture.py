@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inside any Blender, program or module bpy: renders the open (or named) file through the add-on of this source tree into an
-EXR. Arguments after `--`: the picture, and for bpy the .blend file; AFTERGLOW_LIBRARY says where the package is."""
+"""Inside any Blender, program or module bpy: renders the open (or named) file through the add-on of this source tree
+into an EXR, and beside it, named …_cycles, what that Blender's Cycles makes of it by the same settings. Arguments after
+`--`: the picture, and for bpy the .blend file; AFTERGLOW_LIBRARY says where the package is."""
 
 import sys
 from pathlib import Path
@@ -24,4 +25,14 @@ scene.render.image_settings.color_depth = "32"
 scene.render.filepath = arguments[0]
 settings = scene.afterglow
 settings.samples, settings.accuracy, settings.seed, settings.denoise = 256, 0.0, 1, False
+bpy.ops.render.render(write_still=True)
+
+scene.render.engine = "CYCLES"
+scene.render.filepath = str(Path(arguments[0]).with_suffix("")) + "_cycles.exr"
+theirs = scene.cycles
+for name in ("samples", "seed", "max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces",
+             "transparent_max_bounces", "sample_clamp_direct", "sample_clamp_indirect", "caustics_reflective",
+             "caustics_refractive"):
+    setattr(theirs, name, getattr(settings, name))
+theirs.use_adaptive_sampling, theirs.use_denoising, theirs.blur_glossy = False, False, 0.0
 bpy.ops.render.render(write_still=True)
