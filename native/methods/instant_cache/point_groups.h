@@ -42,7 +42,8 @@ struct PointGroup {
   uint32_t padded() const { return (count + kLanes - 1) / kLanes * kLanes; }
   /// Lanes without a point stand where nothing is.
   void pad() {
-    for (uint32_t i = count; i < padded(); ++i) {
+    const uint32_t end = std::min(padded(), kMost);  // said to the compiler, which cannot know that count is
+    for (uint32_t i = count; i < end; ++i) {
       x[i] = y[i] = z[i] = 1e18f;
       nx[i] = ny[i] = nz[i] = inverse_limit[i] = 0.0f;
     }
