@@ -176,6 +176,15 @@ def reference(renderer: Renderer, samples: int, say: Callable[[str], None]) -> t
     return np.asarray(cache.arrays(key, make)["parts"]), not made
 
 
+def was_cut(values: dict[str, Any], statistics: dict[str, Any], budget: float) -> bool:
+    """Whether the time ended a render before its samples or its accuracy did. A pass that would not end in time is not begun:
+    what was cut may have taken less than the budget."""
+    if not values["accuracy"]:
+        return bool(statistics["samples"] < values["samples"])
+    noise = statistics.get("noise")
+    return (noise is None or noise > values["accuracy"]) and statistics["elapsed"] > 0.5 * budget
+
+
 def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, repeats: int, budget: float,
             say: Callable[[str], None], begin: Callable[[int, Setting], None] = lambda number, setting: None) -> list[Point]:
     """Every setting `repeats` times with another seed. A method's settings that would take more than `budget` s by what the last
@@ -203,7 +212,7 @@ def measure(renderer: Renderer, settings: Sequence[Setting], parts: np.ndarray, 
         spent[setting.method] = (min(seconds), (statistics.get("seconds") or {}).get("render", min(seconds)), effort)
         spread = float(np.std(errors, ddof=1) / math.sqrt(repeats)) if repeats > 1 else 0.0
         assert shown is not None
-        name = setting.name + (", cut" if statistics.get("elapsed", 0.0) >= budget else "")
+        name = setting.name + (", cut" if was_cut(values, statistics, budget) else "")
         points.append(Point(
             setting.method, name, float(np.median(seconds)), float(np.mean(errors)),
             math.hypot(spread, float(np.mean(bars))),

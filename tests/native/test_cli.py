@@ -86,6 +86,21 @@ def test_accuracy_of_a_caching_method(library: Path, tmp_path: Path, method: str
     assert [p["accuracy"] for p in points] == sorted((p["accuracy"] for p in points), reverse=True)
 
 
+def test_a_setting_is_cut_at_its_budget() -> None:
+    import numpy as np
+    from afterglow.accuracy import Point, ProceduralRenderer, Setting, measure
+
+    def measured(samples: int, budget: float) -> list[Point]:
+        renderer = ProceduralRenderer("cornell_box", 12)
+        width, height = renderer.resolution
+        setting = Setting("PATH_TRACING", f"{samples} spp", (("samples", samples), ("accuracy", 0.0)))
+        return measure(renderer, [setting], np.ones((2, height, width, 3), np.float32), 1, budget, print)
+
+    assert [point.setting for point in measured(4, 60.0)] == ["4 spp"]
+    (cut,) = measured(1 << 16, 0.3)
+    assert cut.setting == "65536 spp, cut" and cut.samples < 1 << 16
+
+
 def test_the_setting_in_use_is_marked() -> None:
     from afterglow.accuracy import Point, Report, mark_in_use
 

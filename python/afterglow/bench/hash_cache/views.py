@@ -82,8 +82,8 @@ def layers(context: Context) -> list[Figure]:
     figures = []
     for variant in ("mirror", "glass"):
         room = cornell_box(variant)
-        common = {"width": 128, "height": 128, "diffuse_bounces": 4}
-        truth = api.render(room, method="PATH_TRACING", samples=512, seed=9, **common).image
+        common = {"width": 192, "height": 192, "diffuse_bounces": 4}
+        truth = api.render(room, method="PATH_TRACING", samples=2048, seed=9, **common).image
         values = {on: statistics.mean(metrics.ms_ssim(
             api.render(room, method="HASH_CACHE", samples=1, seed=s, hash_filter=on, **common).image, truth) for s in range(3))
             for on in (True, False)}
