@@ -111,8 +111,14 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
         if (open[i]) asked[left++] = asked[i];
       asked.resize(left);
       const uint32_t first = uint32_t(records_.size());
+      // A point that has a record of its own is not asked again: where even that one does not cover it, none will.
+      left = 0;
       for (const uint32_t i : asked)
-        if (!covered(points[i]) && !insert(scene, points[i])) counts_.refused++;
+        if (covered(points[i]))
+          asked[left++] = i;
+        else if (!insert(scene, points[i]))
+          counts_.refused++;
+      asked.resize(left);
       if (records_.size() == first) break;
       std::vector<uint32_t> fresh(records_.size() - first);
       for (uint32_t i = 0; i < fresh.size(); ++i) fresh[i] = first + i;
