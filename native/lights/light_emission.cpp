@@ -66,6 +66,7 @@ void LightEmission::build(const Scene& scene, const Materials& materials) {
   scene_ = &scene, materials_ = &materials;
   emitters_.clear(), lamps_.clear(), patch_areas_.clear(), world_map_.clear();
   surrounding_ball(scene.bounds(), center_, radius_);
+  far_ = false;
   for (const Handle handle : scene.light_handles()) {
     const Light& light = scene.light(handle);
     Light unit = light;
@@ -77,6 +78,7 @@ void LightEmission::build(const Scene& scene, const Materials& materials) {
     Emitter e{.kind = Emitter::kLamp, .lamp = uint32_t(lamps_.size()), .strength = strength};
     if (!(light.visibility & kVisibleDiffuse)) e.strength = Rgb(0.0f);
     e.power = luminance(e.strength) * unit_power(*lamp, radius_);
+    far_ |= lamp->infinite();
     lamps_.push_back(*lamp);
     emitters_.push_back(e);
   }
@@ -105,7 +107,7 @@ void LightEmission::build(const Scene& scene, const Materials& materials) {
       mean = world_map_.mean();
     }
     e.power = mean * 4.0f * kPi * kPi * radius_ * radius_;
-    if (mean > 0.0f) emitters_.push_back(e);
+    if (mean > 0.0f) emitters_.push_back(e), far_ = true;
   }
   float strongest = 0.0f, sum = 0.0f;
   for (const Emitter& e : emitters_) strongest = std::max(strongest, e.power);
@@ -142,6 +144,10 @@ void LightEmission::from_far(const Vec3& direction, const Vec2& place, Ray& ray)
   ray.origin = center_ + disk.x * frame.t + disk.y * frame.b - 1.01f * radius_ * direction;
 }
 
+void LightEmission::far_through(const Vec3& place, Ray& ray) const {
+  ray.origin = place - (glm::dot(place - center_, ray.direction) + 1.01f * radius_) * ray.direction;
+}
+
 bool LightEmission::sample_lamp_ray(const Emitter& e, const Vec2& place, const Vec2& way, EmittedRay& out) const {
   const Lamp& lamp = lamps_[e.lamp];
   Ray& ray = out.ray;
@@ -154,7 +160,7 @@ bool LightEmission::sample_lamp_ray(const Emitter& e, const Vec2& place, const V
         out.weight /= cone_density(lamp.one_minus_cos);
       }
       from_far(direction, place, ray);
-      out.weight *= kPi * radius_ * radius_;
+      out.weight *= out.beam = kPi * radius_ * radius_;
       return true;
     }
     case LampShape::kPoint:
@@ -237,7 +243,8 @@ bool LightEmission::sample_world_ray(const Vec2& place, const Vec2& way, Emitted
   if (!(density > 0.0f)) return false;
   from_far(-from, place, out.ray);
   out.flux = glm::max(materials_->world(from, kEmissionContext), Rgb(0.0f));
-  out.weight *= kPi * radius_ * radius_ / density;
+  out.beam = kPi * radius_ * radius_;
+  out.weight *= out.beam / density;
   return true;
 }
 

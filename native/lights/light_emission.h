@@ -16,7 +16,8 @@ struct EmittedRay {
   Ray ray;
   float weight = 0.0f;  // 1 / density of choice, place and direction: times arriving() it is flux
   uint32_t emitter = kNone;
-  Rgb flux{0.0f};  // of emissive meshes and the world, complete; lamps: see arriving()
+  float beam = 0.0f;  // area of the beam that a ray from far away was chosen from
+  Rgb flux{0.0f};     // of emissive meshes and the world, complete; lamps: see arriving()
 };
 
 class LightEmission {
@@ -24,11 +25,20 @@ class LightEmission {
   void build(const Scene&, const Materials&);
   bool empty() const { return emitters_.empty(); }
   uint32_t count() const { return uint32_t(emitters_.size()); }
+  /// Whether a sun or a world shines, whose rays come from outside of the scene.
+  bool far() const { return far_; }
   /// u_choice chooses the emitter, `place` a point on it (or across the scene), `way` a direction. False: nothing
   /// leaves.
   bool sample(float u_choice, const Vec2& place, const Vec2& way, EmittedRay&) const;
   /// Flux that the ray brings to a point that it reached.
   Rgb arriving(const EmittedRay&, const Vec3& position) const;
+
+  /// Rays of one direction from outside of the scene, the one through a place; and the beam's middle and radius.
+  void far_through(const Vec3& place, Ray&) const;
+  bool in_beam(const Ray& ray) const {
+    const Vec3 way = ray.origin - center_;
+    return glm::length(way - glm::dot(way, ray.direction) * ray.direction) <= radius_;
+  }
 
   /// A ball around the bounds, snapped to a coarse grid so that small edits do not move the rays of suns and worlds.
   static void surrounding_ball(const Box& bounds, Vec3& center, float& radius);
@@ -58,6 +68,7 @@ class LightEmission {
   WorldMap world_map_;
   Vec3 center_{0.0f};
   float radius_ = 0.0f;
+  bool far_ = false;
 };
 
 }  // namespace afterglow

@@ -6,14 +6,16 @@
 #include <mutex>
 
 #include "base/parallel.h"
+#include "transport/light_importance.h"
 
 namespace afterglow {
 
 namespace {
 
 constexpr uint32_t kStartDimensions = 8, kBounceDimensions = 8;
-constexpr uint32_t kBeginnings = 4;  // of a path, one of which is gone on with
-constexpr int kMostPassages = 64;    // mirrors, glass and transparent surfaces between two diffuse ones
+constexpr uint32_t kBeginnings = 4, kFarBeginnings = 16;  // of a path, one of which is gone on with
+constexpr float kWhole = 0.25f;    // of the rays from far away go anywhere, the others where light matters
+constexpr int kMostPassages = 64;  // mirrors, glass and transparent surfaces between two diffuse ones
 
 /// What a surface does to light paths: diffuse lobes reflect and transmit, the others lead on.
 struct Shares {
@@ -31,50 +33,63 @@ Shares take_diffuse(Surface& surface) {
 
 float brightness(const Rgb& c) { return (c.x + c.y + c.z) / 3.0f; }
 
+/// A point of a sequence, of which a path or a beginning takes its numbers.
+struct PathPoint {
+  uint32_t seed = 0, index = 0;
+};
+
 class LightPath {
  public:
-  LightPath(const WalkScene& walk, const LightEmission& emission, const SlotPlan& plan, RayCounts& counts)
-      : walk_(walk), emission_(emission), plan_(plan), counts_(counts) {}
+  /// importance: null where all places count the same.
+  LightPath(const WalkScene& walk, const LightEmission& emission, const SlotPlan& plan,
+            const LightImportance* importance, RayCounts& counts)
+      : walk_(walk), emission_(emission), plan_(plan), importance_(importance), counts_(counts) {}
 
-  /// Most rays of a sky miss a room with a window: of several beginnings the first that meets a surface is taken, with
-  /// the strength of their share that does. Which one that is depends on nothing but who meets something, so the mean
-  /// stays.
-  void trace(uint32_t path, uint32_t seed, std::vector<VirtualLight>& out) {
+  /// Most rays of a sky miss a room with a window: of several beginnings the first that meets a surface is taken.
+  /// Which one that is depends on nothing but who meets something, so the mean stays. Returns how many did: with the
+  /// strength of their share the lights are complete.
+  uint32_t trace(uint32_t path, uint32_t seed, std::vector<VirtualLight>& out) {
     uint32_t alive = 0;
     VirtualLight first;
     LightPath chosen = *this;
     bool goes_on = false;
-    uint32_t index = path;
-    for (uint32_t candidate = 0; candidate < kBeginnings; ++candidate) {
-      const uint32_t at = path + candidate * plan_.paths[0];
+    PathPoint chosen_point;
+    for (uint32_t candidate = 0; candidate < beginnings(importance_); ++candidate) {
+      // Few beginnings go on with one sequence, many take one each: of a path's own none is like another then.
+      const PathPoint point = importance_ ? PathPoint{candidate ? hash(seed, candidate) : seed, path}
+                                          : PathPoint{seed, path + candidate * plan_.paths[0]};
       VirtualLight light;
-      const bool more = begin(at, seed, light);
-      if (!light.alive || alive++ > 0) continue;
-      first = light, goes_on = more, index = at;
+      const bool more = begin(point, light);
+      if (!light.alive) continue;
+      if (alive++ > 0) continue;
+      first = light, goes_on = more, chosen_point = point;
       chosen.take(*this);
     }
-    if (!alive) return;
-    const float share = float(alive) / float(kBeginnings);
-    first.front *= share, first.back *= share;
+    if (!alive) return 0;
     out[plan_.first[0] + path] = first;
     take(chosen);
-    throughput_ *= share;
-    Sampler sampler(seed, index);
+    Sampler sampler(chosen_point.seed, chosen_point.index);
     for (uint32_t bounce = 1; goes_on && bounce < plan_.paths.size() && path < plan_.paths[bounce]; ++bounce) {
       sampler.set_dimension(kStartDimensions + kBounceDimensions * bounce);
       goes_on = next_light(sampler, 1.0f / float(plan_.paths[bounce]), out[plan_.first[bounce] + path]);
     }
+    return alive;
   }
+
+  static uint32_t beginnings(const LightImportance* importance) { return importance ? kFarBeginnings : kBeginnings; }
 
  private:
   /// From the emitter to the first diffuse surface. False: the path ends there.
-  bool begin(uint32_t index, uint32_t seed, VirtualLight& light) {
-    Sampler sampler(seed, index);
+  bool begin(const PathPoint& at, VirtualLight& light) {
+    Sampler sampler(at.seed, at.index);
     const float u_choice = sampler.next1();
     const Vec2 place = sampler.next2(), way = sampler.next2();
     if (!emission_.sample(u_choice, place, way, from_)) return false;
-    ray_ = from_.ray;
     first_ = true;
+    guided_ = importance_ && from_.beam > 0.0f;
+    passes_ = 0.0f;
+    if (guided_ && unit_float(hash(at.seed, at.index, 0x1a7u)) >= kWhole && !aim(at)) return false;
+    ray_ = from_.ray;
     context_ = PathContext{};
     context_.kind = PathContext::kDiffuse | PathContext::kReflection;
     context_.drop_glossy = !walk_.limits.caustics_reflective;
@@ -84,10 +99,33 @@ class LightPath {
     return next_light(sampler, 1.0f / float(plan_.paths[0]), light);
   }
 
+  /// Sends the ray from far away through a place where light matters.
+  bool aim(const PathPoint& at) {
+    Vec3 through;
+    if (!importance_->sample(at.seed, at.index, through)) return false;
+    emission_.far_through(through, from_.ray);
+    passes_ = glm::dot(through - from_.ray.origin, from_.ray.direction);
+    return true;
+  }
+
+  /// Where the straight way from far away ends. False: before the place that it was to pass. Chosen ways are those that
+  /// pass it, and how dense they are is known from all places along the way that was gone.
+  bool weigh(const Vec3& end) {
+    if (!guided_) return true;
+    guided_ = false;
+    const Ray& line = from_.ray;
+    const float length = glm::dot(end - line.origin, line.direction);
+    if (!(length >= passes_)) return false;
+    const float anywhere = emission_.in_beam(line) ? kWhole / from_.beam : 0.0f;
+    const float density = anywhere + (1.0f - kWhole) * importance_->along(line.origin, line.direction, length);
+    throughput_ /= std::max(density * from_.beam, 1e-6f);
+    return true;
+  }
+
   /// Stands where another path stands.
   void take(const LightPath& other) {
     from_ = other.from_, ray_ = other.ray_, context_ = other.context_;
-    throughput_ = other.throughput_, first_ = other.first_;
+    throughput_ = other.throughput_, first_ = other.first_, guided_ = other.guided_;
   }
 
   /// Goes on to the next surface with a diffuse lobe and leaves a light there. False: the path ended.
@@ -114,6 +152,7 @@ class LightPath {
         go_straight(point);
         continue;
       }
+      if (!weigh(point.position)) return false;
       const Shares shares = take_diffuse(surface);
       const bool has_diffuse = !is_black(shares.front) || !is_black(shares.back) || surface.count == 0;
       if (!has_diffuse) {
@@ -211,13 +250,36 @@ class LightPath {
   const WalkScene& walk_;
   const LightEmission& emission_;
   const SlotPlan& plan_;
+  const LightImportance* importance_;
   RayCounts& counts_;
   EmittedRay from_;
   Ray ray_;
   PathContext context_;
   Rgb throughput_{1.0f};
-  bool first_ = true;
+  bool first_ = true, guided_ = false;  // the density of its way is not yet known
+  float passes_ = 0.0f;                 // how far along its first ray the place lies that it was to pass
 };
+
+/// The share of beginnings that met something. Where few do it is that of all paths, and the paths that have one stand
+/// for those that have none: who meets something says nothing of what is met, so the mean stays, and no light is
+/// stronger than another by mere luck. Elsewhere each path has its own, which no other path changes.
+void set_shares(const SlotPlan& plan, const std::vector<uint32_t>& alive, uint32_t beginnings, bool together,
+                std::vector<VirtualLight>& lights) {
+  const uint32_t paths = plan.paths[0];
+  uint64_t all = 0;
+  for (const uint32_t a : alive) all += a;
+  for (size_t bounce = 0; bounce < plan.paths.size(); ++bounce) {
+    const uint32_t count = plan.paths[bounce];
+    uint32_t begun = 0;
+    for (uint32_t path = 0; path < count; ++path) begun += alive[path] > 0;
+    const double whole = double(all) / (double(beginnings) * paths) * count / std::max(begun, 1u);
+    for (uint32_t path = 0; path < count; ++path) {
+      VirtualLight& light = lights[plan.first[bounce] + path];
+      const float share = together ? float(whole) : float(alive[path]) / float(beginnings);
+      light.front *= share, light.back *= share;
+    }
+  }
+}
 
 }  // namespace
 
@@ -251,13 +313,19 @@ std::vector<VirtualLight> trace_virtual_lights(const WalkScene& walk, const Ligh
   std::vector<VirtualLight> lights(plan.slots);
   if (plan.paths.empty() || emission.empty()) return lights;
   const uint32_t seed = hash(0x5eedu, options.pattern);
+  LightImportance importance;
+  if (emission.far()) importance.build(walk, snapped_viewpoint(walk.scene), options.threads, counts);
+  const LightImportance* used = importance.empty() ? nullptr : &importance;
+  std::vector<uint32_t> alive(plan.paths[0]);
   std::mutex mutex;
   parallel_blocks(plan.paths[0], 32, options.threads, [&](size_t begin, size_t end) {
     RayCounts mine;
-    for (size_t i = begin; i < end; ++i) LightPath(walk, emission, plan, mine).trace(uint32_t(i), seed, lights);
+    for (size_t i = begin; i < end; ++i)
+      alive[i] = LightPath(walk, emission, plan, used, mine).trace(uint32_t(i), seed, lights);
     const std::lock_guard lock(mutex);
     counts += mine;
   });
+  set_shares(plan, alive, LightPath::beginnings(used), used, lights);
   return lights;
 }
 

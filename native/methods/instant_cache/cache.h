@@ -13,6 +13,7 @@
 #include "methods/virtual_light_settings.h"
 #include "methods/walk_settings.h"
 #include "rays/ray_subset.h"
+#include "transport/light_importance.h"
 
 namespace afterglow::instant_cache {
 
@@ -113,6 +114,7 @@ class Cache {
   bool loaded_ = false;  // came from a file: the lights have to be compared
   Spacing spacing_;
   LightEmission emission_;
+  Viewpoint viewpoint_;  // that the lights were traced for
   VirtualLightColumns lights_;
   std::vector<uint64_t> front_, back_;  // bits: lights that shine on that side
   Placement placement_;

@@ -89,7 +89,9 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   SceneChanges seen = changes;
   seen.camera = false;
   counts_.updated = counts_.reused = counts_.moved = counts_.created = 0;
-  const bool compares = std::exchange(loaded_, false) || scaled;
+  const Viewpoint viewpoint = snapped_viewpoint(scene);
+  const bool other_view = std::exchange(viewpoint_, viewpoint) != viewpoint && emission_.far();
+  const bool compares = std::exchange(loaded_, false) || scaled || other_view;
   if (!all && !compares && seen.empty()) {
     counts_.reused = records_.size();
     std::vector<uint32_t> waiting;  // an earlier update was interrupted

@@ -6,9 +6,11 @@
 #include <array>
 #include <chrono>
 #include <mutex>
+#include <utility>
 
 #include "methods/virtual_light_settings.h"
 #include "methods/walk_settings.h"
+#include "transport/light_importance.h"
 
 namespace afterglow::instant_radiosity {
 
@@ -32,7 +34,9 @@ class InstantRadiosity final : public IndirectMethod {
     const SceneChanges& c = changes;
     SceneChanges seen = c;
     seen.camera = false;
-    if (!stale_ && seen.empty()) return;
+    const Viewpoint viewpoint = snapped_viewpoint(scene);
+    const bool other_view = std::exchange(viewpoint_, viewpoint) != viewpoint && emission_.far();
+    if (!stale_ && !other_view && seen.empty()) return;
     stale_ = false;
     const auto begun = std::chrono::steady_clock::now();
     emission_.build(scene.scene, scene.materials);
@@ -105,6 +109,7 @@ class InstantRadiosity final : public IndirectMethod {
   WalkSettings settings_;
   VirtualLightSettings lights_settings_;
   LightEmission emission_;
+  Viewpoint viewpoint_;  // that the lights were traced for
   InstanceMask shown_;
   std::array<VirtualLightColumns, kParts> parts_;
   VirtualLightColumns whole_;

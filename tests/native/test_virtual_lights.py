@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where light paths begin: they bring what the path tracer finds, are worth something to the camera, and stay where they are."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import afterglow
+import numpy as np
+import pytest
+from afterglow.scenes import Camera, Description, Light, look_at, rotate, translate
+from afterglow.scenes.native import Built
+from afterglow.scenes.rooms import background, diffuse
+from afterglow.scenes.shapes import box, join, quad, sphere
+from hard_cases import Mean, agree, render
+
+SETTINGS: dict[str, Any] = dict(size=16, passes=["diffuse_indirect"], caustics_reflective=False, diffuse_bounces=3)
+
+
+def windowed_room(*, sun: bool = True, sky: bool = True) -> Description:
+    """A room of 4 × 4 × 2.4 m below a wide flat roof; a ball within and one window."""
+    scene = Description("windowed_room", Camera(look_at((1.5, -1.5, 1.5), (-1.5, 1.0, 0.8)), math.radians(60)))
+    scene.materials.update(white=diffuse((0.7, 0.7, 0.7)), ball=diffuse((0.7, 0.3, 0.2)))
+    walls = join(
+        quad((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)), quad((-5, 5, 2.4), (5, 5, 2.4), (5, -5, 2.4), (-5, -5, 2.4)),
+        quad((-2, 2, 0), (2, 2, 0), (2, 2, 2.4), (-2, 2, 2.4)), quad((2, -2, 0), (-2, -2, 0), (-2, -2, 2.4), (2, -2, 2.4)),
+        quad((-2, -2, 0), (-2, 2, 0), (-2, 2, 2.4), (-2, -2, 2.4)), quad((2, 2, 0), (2, -2, 0), (2, -2, 0.8), (2, 2, 0.8)),
+        quad((2, 2, 0.8), (2, 0.6, 0.8), (2, 0.6, 2.4), (2, 2, 2.4)), quad((2, -0.6, 0.8), (2, -2, 0.8), (2, -2, 2.4), (2, -0.6, 2.4)),
+    )
+    scene.add("Walls", walls, "white")
+    scene.add("Ball", sphere(0.25, 24, 12), "ball", transform=translate((-0.8, 0.6, 0.3)))
+    scene.add("Shed", box((-4.8, -4.8, 0), (-3.0, -3.0, 1.5)), "white")
+    if sun:
+        scene.lights = [Light("Sun", "sun", look_at((5, 0.4, 1.2), (0, 0, 0)), 20.0, angle=0.02)]
+    if sky:
+        scene.world = background((0.5, 0.7, 1.0), 1.0)
+    return scene
+
+
+def indirect(scene: Any, repeats: int, **settings: Any) -> Mean:
+    images = [render(scene, seed=50 + i, light_pattern=i, **{**SETTINGS, **settings}) for i in range(repeats)]
+    values = [float(image.passes["diffuse_indirect"].mean(dtype=np.float64)) for image in images]
+    return Mean(float(np.mean(values)), float(np.std(values, ddof=1) / repeats**0.5))
+
+
+@pytest.mark.parametrize(("sun", "sky"), [(True, False), (False, True), (True, True)])
+def test_suns_and_skies_through_a_window_bring_the_path_tracers_light(sun: bool, sky: bool) -> None:
+    """Beginnings are chosen where light matters, and their density is known: no bias; and they are worth something."""
+    scene = windowed_room(sun=sun, sky=sky)
+    truth = indirect(scene, 4, method="PATH_TRACING", samples=256)
+    exact = dict(method="INSTANT_RADIOSITY", light_bound=0.0, interleave=False, samples=4)
+    found = indirect(scene, 12, virtual_lights=1000, **exact)
+    agree(found, truth, tolerance=0.02)
+    assert found.error < 0.1 * found.value
+    image = render(scene, **{**SETTINGS, **exact, "virtual_lights": 1000})
+    assert image.statistics["values"]["virtual_lights"] > 500
+
+
+class Live:
+    def __init__(self, **settings: Any) -> None:
+        self.built = Built(windowed_room())
+        fixed = dict(method="INSTANT_CACHE", width=24, height=24, samples=1, virtual_lights=256, cache_verify=True, diffuse_bounces=3)
+        self.session = afterglow.Session(self.built.scene, {**fixed, **settings})
+        self.session.start()
+        self.session.wait()
+
+    def look(self, position: Any, at: Any) -> dict[str, Any]:
+        def change() -> None:
+            self.built.description.camera.transform = look_at(position, at)
+            self.built.set_camera((24, 24), 0)
+
+        return self.edit(change)
+
+    def edit(self, change: Any) -> dict[str, Any]:
+        with self.session.edit():
+            change()
+            self.built.scene.commit()
+        self.session.wait()
+        found = self.session.statistics()
+        return {**found["values"], **{f"{kind}_rays": count for kind, count in found["rays"].items()}}
+
+
+def test_lights_stay_while_a_view_turns_and_follow_it_into_another_place() -> None:
+    live = Live()
+    before = live.look((1.2, -1.2, 1.2), (0, 0, 1))["path_rays"]
+    for turn in np.linspace(0, 2, 5):
+        numbers = live.look((1.2 + 0.1 * turn, -1.2, 1.2), (1.2 - math.cos(turn), -1.2 + math.sin(turn), 1.1))
+        assert numbers["path_rays"] == before and numbers["verified_differing"] == 0
+    away = live.look((-1.6, 1.7, 0.5), (0, 0, 1))
+    assert away["path_rays"] > before and 0 < away["lights_moved"] and away["verified_differing"] == 0
+
+
+def test_an_object_that_moves_leaves_most_lights_where_they_are() -> None:
+    live = Live()
+    for step in range(1, 5):
+        numbers = live.edit(lambda: live.built.scene.set_transforms(
+            live.built.instances["Ball"], (translate((-0.8 + 0.05 * step, 0.6, 0.3)) @ rotate(0.2 * step))[None]))
+        assert numbers["lights_moved"] < 0.15 * 256 and numbers["verified_differing"] == 0, numbers["lights_moved"]
+
+
+def test_threads_leave_beginnings_alone() -> None:
+    images = [render(windowed_room(), **{**SETTINGS, "method": "INSTANT_CACHE", "samples": 2, "threads": threads}).image
+              for threads in (1, 2)]
+    assert np.array_equal(*images)
