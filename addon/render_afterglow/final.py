@@ -110,6 +110,7 @@ def render_layer(
         passes=[item.native for item in wanted],
         mist=mist_settings(scene),
     )
+    settings["carry_over"] = bool(settings["carry_over"] and persistent)
     session = backend.afterglow.Session(native.scene, settings)
     cancelled = False
     try:

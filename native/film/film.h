@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "film/carry_over.h"
 #include "film/error_estimate.h"
 #include "film/passes.h"
 #include "film/pixel_filter.h"
@@ -83,6 +84,30 @@ class Film {
   void add(uint32_t x, uint32_t y, const float* sums, uint32_t samples, float squares = 0.0f, bool extra = false);
   void clear();
 
+  /// From here on samples outlive edits of the scene, see carry_over.h; needs kCarriedPasses. After
+  /// begin_asking() the samples that come are each pixel's asked one, the same in every state of the scene, until
+  /// end_asking(1). end_asking(step): every step-th pixel has it.
+  static constexpr PassSet kCarriedPasses = bit(Pass::kDiffuseDirect) | bit(Pass::kDiffuseIndirect) |
+                                            bit(Pass::kDiffuseColor) | bit(Pass::kEmission) | bit(Pass::kEnvironment);
+  void carry_over();
+  bool carries() const { return carry_ != nullptr; }
+  void begin_asking();
+  void end_asking(uint32_t step);
+  bool asks() const { return asking_; }
+  /// Whether any pixel of a request has to be asked soon; the others' turn comes with ask_the_rest().
+  bool wants(const PixelRequest&) const;
+  void ask_the_rest();
+  bool rest_waits() const { return carry_ && carry_->some_quiet(); }
+  /// The first diffuse surface of the asked sample of a pixel of the full image: after its add().
+  void guide(uint32_t x, uint32_t y, const LayerPixel&);
+  /// From here on pictures show diffuse direct light filtered. deviations: of one sample of each pixel, relative.
+  void smooth(const std::vector<float>& deviations, unsigned threads, StopToken stop);
+  /// The number of the next sample that no pixel has had; moves on.
+  uint32_t next_sample() { return ++sample_; }
+  uint32_t samples(size_t pixel) const { return counts_[pixel]; }
+  /// What samples of carried films spread by, as BelievedError's value.
+  float spread() const;
+
   /// A pass over the region, row 0 at the bottom, pass_info(pass).channels values a pixel. step > 1: only every step-th
   /// pixel has samples; the others are shown as their block's first.
   void read(Pass, float* out, uint32_t step = 1) const;
@@ -95,6 +120,9 @@ class Film {
   void read_error(float* out, uint32_t step) const;
   void read_row(Pass, float* out, uint32_t y, uint32_t step) const;
   void read_pixel(Pass, const float* sums, uint32_t samples, float* out) const;
+  void read_edited(size_t pixel, size_t asked, float* out) const;
+  void settle(size_t pixel);
+  void keep(size_t pixel, uint32_t samples, const Rgb& cached);
   FilmSettings settings_;
   FilmLayout layout_;
   PixelFilter filter_;
@@ -102,6 +130,9 @@ class Film {
   std::vector<uint32_t> counts_;
   std::vector<float> squares_;    // empty: no noise is kept
   std::vector<uint32_t> extras_;  // of counts_
+  std::unique_ptr<CarryOver> carry_;
+  bool asking_ = false;
+  uint32_t sample_ = 0;
   mutable std::vector<std::atomic_flag> locks_;
 };
 

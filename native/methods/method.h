@@ -40,6 +40,7 @@ struct MethodTraits {
   bool layers = false;  // wants the layered filter
   bool needs_next_frame = false;
   bool running = false;      // the picture of a view that stands still goes on from render to render
+  bool steady = false;       // answers have no noise: the same question is answered alike until the scene is edited
   uint32_t lights = 1;       // samples of the light sources that the renderer takes at a first surface
   uint32_t interleave = 1;   // n: neighbouring pixels ask n × n different parts of the lights; answers want the
                              // discontinuity buffer

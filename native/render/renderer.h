@@ -27,6 +27,8 @@ class Renderer {
   /// Whether what samples spread by is the picture's error, or noise alone.
   bool exact() const { return method_->traits().exact; }
   float extra() const { return method_->traits().extra; }
+  /// Whether light that the method answers for is without noise, and stands in a pass of its own.
+  bool carries() const { return method_->traits().steady; }
   bool running() const { return method_->traits().running; }
   void configure(const Settings&);
 

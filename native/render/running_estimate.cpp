@@ -18,6 +18,8 @@ auto fields(const Camera& c) {
 
 }  // namespace
 
+bool same_view(const Camera& one, const Camera& other) { return fields(one) == fields(other); }
+
 std::shared_ptr<Film> RunningEstimate::take(const CommittedScene& scene, const RenderSettings& settings,
                                             const FilmSettings& film, uint32_t& samples) {
   const auto kept = scene.kept.take<RunningEstimate>(kName);
@@ -25,11 +27,22 @@ std::shared_ptr<Film> RunningEstimate::take(const CommittedScene& scene, const R
   SceneChanges changes = scene.scene.changes_since(kept->version_);
   changes.camera = false;
   const RenderSettings& before = kept->settings_;
-  if (!changes.empty() || fields(kept->camera_) != fields(scene.scene.camera())) return nullptr;
+  if (!changes.empty() || !same_view(kept->camera_, scene.scene.camera())) return nullptr;
   if (before.method != settings.method || before.method_settings != settings.method_settings ||
       before.seed == settings.seed || kept->film_->settings() != film || kept->samples_ >= kMost)
     return nullptr;
   samples = kept->samples_;
+  return kept->film_;
+}
+
+std::shared_ptr<Film> RunningEstimate::take_carried(const CommittedScene& scene, const RenderSettings& settings,
+                                                    const FilmSettings& film, int64_t& seed) {
+  const auto kept = scene.kept.take<RunningEstimate>(kName);
+  if (!kept || !kept->film_->carries() || kept->film_->settings() != film) return nullptr;
+  RenderSettings same = settings;
+  same.seed = kept->settings_.seed;
+  if (!kept->settings_.same_samples(same) || !same_view(kept->camera_, scene.scene.camera())) return nullptr;
+  seed = same.seed;
   return kept->film_;
 }
 

@@ -12,11 +12,17 @@
 
 namespace afterglow {
 
+/// Whether two cameras see the same.
+bool same_view(const Camera&, const Camera&);
+
 class RunningEstimate {
  public:
   /// The film that the last render left, where scene, view and settings are the same but for the seed; else nothing.
   static std::shared_ptr<Film> take(const CommittedScene&, const RenderSettings&, const FilmSettings&,
                                     uint32_t& samples);
+  /// A carried film of the same view, whatever was edited since; `seed` becomes that of its samples.
+  static std::shared_ptr<Film> take_carried(const CommittedScene&, const RenderSettings&, const FilmSettings&,
+                                            int64_t& seed);
   static void leave(const CommittedScene&, const RenderSettings&, std::shared_ptr<Film>, uint32_t samples);
 
  private:

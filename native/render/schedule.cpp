@@ -55,4 +55,50 @@ std::vector<PixelRequest> pass_requests(const PassPlan& plan, uint32_t x0, uint3
   return requests;
 }
 
+uint32_t least_samples(const Film& film) {
+  uint32_t least = ~0u;
+  for (size_t p = 0, n = size_t(film.width()) * film.height(); p < n; ++p) least = std::min(least, film.samples(p));
+  return least;
+}
+
+std::vector<PixelRequest> catch_up_requests(Film& film) {
+  constexpr uint32_t kSide = 16;
+  const FilmSettings& f = film.settings();
+  const uint32_t number = film.next_sample(), least = least_samples(film), most = least + least / 2;
+  const auto behind = [&](uint32_t x, uint32_t y) {
+    return film.samples(size_t(y - f.y0) * film.width() + (x - f.x0)) <= most;
+  };
+  std::vector<PixelRequest> requests;
+  const auto add = [&](uint32_t x, uint32_t y, uint32_t width, uint32_t height) {
+    requests.push_back(
+        {.x = uint16_t(x), .y = uint16_t(y), .width = uint16_t(width), .height = uint16_t(height), .first = number});
+  };
+  for (uint32_t y0 = f.y0; y0 < f.y1; y0 += kSide)
+    for (uint32_t x0 = f.x0; x0 < f.x1; x0 += kSide) {
+      const uint32_t x1 = std::min(x0 + kSide, f.x1), y1 = std::min(y0 + kSide, f.y1);
+      uint32_t wanted = 0;
+      for (uint32_t y = y0; y < y1; ++y)
+        for (uint32_t x = x0; x < x1; ++x) wanted += behind(x, y);
+      if (wanted * 8 >= (x1 - x0) * (y1 - y0) * 7) {
+        add(x0, y0, x1 - x0, y1 - y0);
+        continue;
+      }
+      for (uint32_t y = y0; y < y1 && wanted; ++y)
+        for (uint32_t x = x0; x < x1;) {
+          uint32_t end = x;
+          while (end < x1 && behind(end, y)) ++end;
+          if (end > x) add(x, y, end - x, 1), wanted -= end - x;
+          x = end + 1;
+        }
+    }
+  return requests;
+}
+
+std::vector<PixelRequest> waiting_requests(const Film& film) {
+  const FilmSettings& f = film.settings();
+  std::vector<PixelRequest> requests = pass_requests({0, 1, 1, 0}, f.x0, f.y0, f.x1, f.y1);
+  std::erase_if(requests, [&](const PixelRequest& r) { return film.wants(r); });
+  return requests;
+}
+
 }  // namespace afterglow

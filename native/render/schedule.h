@@ -35,6 +35,13 @@ inline constexpr uint32_t kCoarsestStep = 32;
 /// The pass as requests over a region, in an order that keeps neighbours together.
 std::vector<PixelRequest> pass_requests(const PassPlan&, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1);
 
+/// The next sample for the pixels of a carried film that have fewest: those that an edit left without samples catch up
+/// first, half as many again as the least at a time.
+std::vector<PixelRequest> catch_up_requests(Film&);
+uint32_t least_samples(const Film&);
+/// The asked sample of the pixels that were left for later.
+std::vector<PixelRequest> waiting_requests(const Film&);
+
 /// Whether a believed error is to be looked at after this many samples: when those batches that have begun are full.
 inline bool error_is_due(uint32_t samples) { return samples >= 16 && samples % 16 == 0; }
 /// Whether it may end the render: when all batches have samples.

@@ -227,6 +227,10 @@ void Session::read(Pass pass, std::vector<float>& out, uint32_t& width, uint32_t
   film->read(pass, out.data(), step);
 }
 
+bool Session::carried(const RenderSettings& settings, const Film& film) const {
+  return film.carries() && film_made_for_.same_samples(settings) && same_view(film_seen_by_, scene_->scene.camera());
+}
+
 void Session::set_stage(const char* stage) {
   const std::lock_guard lock(mutex_);
   stage_ = stage;
@@ -251,6 +255,8 @@ void Session::run(RenderSettings settings) {
     method_settings.emplace_back("denoise", settings.denoise);
     renderer.configure(method_settings);
     if (settings.denoise) settings.film.passes |= kDenoisePasses;
+    const bool carries = settings.carry_over && renderer.carries();
+    if (carries) settings.film.passes |= Film::kCarriedPasses;
     std::shared_ptr<Film> film;
     {
       const std::lock_guard lock(mutex_);
@@ -259,12 +265,19 @@ void Session::run(RenderSettings settings) {
     const FilmSettings wanted = completed(settings.film);
     const bool running = renderer.running() && !settings.viewport;
     uint32_t before = 0;
-    if (auto last = running ? RunningEstimate::take(*scene_, settings, wanted, before) : nullptr)
+    if (carries && !settings.viewport) {
+      film = RunningEstimate::take_carried(*scene_, settings, wanted, settings.seed);
+      if (!film) film = std::make_shared<Film>(wanted);
+    } else if (auto last = running ? RunningEstimate::take(*scene_, settings, wanted, before) : nullptr)
       film = std::move(last);
-    else if (film && film->settings() == wanted)
-      film->clear();
-    else
+    else if (film && film->settings() == wanted && film->carries() == carries) {
+      if (!carries || !carried(settings, *film)) film->clear();
+    } else {
       film = std::make_shared<Film>(wanted);
+    }
+    if (carries) film->carry_over();
+    film_made_for_ = settings;
+    film_seen_by_ = scene_->scene.camera();
     {
       const std::lock_guard lock(mutex_);
       film_ = film;
@@ -279,7 +292,8 @@ void Session::run(RenderSettings settings) {
     uint32_t samples = 0;
     run_limited(settings.threads, [&] { samples = render_passes(settings, renderer, *film, before); });
     if (stop_) result = SessionState::kCancelled;
-    if (running && !stop_) RunningEstimate::leave(*scene_, settings, film, samples);
+    if ((running || (carries && !settings.viewport)) && !stop_)
+      RunningEstimate::leave(*scene_, settings, film, samples);
     Renderer::leave(*scene_, std::move(kept));
   } catch (const std::bad_alloc&) {
     failure = std::make_exception_ptr(OutOfMemory("the render ran out of memory; lower the resolution or the passes"));

@@ -91,6 +91,8 @@ class Session {
   void run(RenderSettings);
   /// From `before` samples on, which the film has already; returns how many it has then.
   uint32_t render_passes(const RenderSettings&, Renderer&, Film&, uint32_t before);
+  /// Whether the film is of this view and its samples may outlive what was edited.
+  bool carried(const RenderSettings&, const Film&) const;
   void publish(const RenderSettings&, const Film&, uint32_t step, bool filtered);
   bool filter(const RenderSettings&, const Film&, Image&);
   void warn(const std::string&);
@@ -110,6 +112,8 @@ class Session {
   std::atomic<uint64_t> samples_done_{0};
   double sample_seconds_ = 0.0;  // of the thread alone: what a sample took last, which decides how coarse a start is
   static constexpr uint64_t kSamplesToTime = 512;
+  RenderSettings film_made_for_;  // of the thread alone: what the film's samples are of
+  Camera film_seen_by_;
 
   mutable std::mutex mutex_;  // all below
   mutable std::condition_variable changed_;

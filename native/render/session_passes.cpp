@@ -21,6 +21,9 @@ constexpr uint32_t kPrefilterFrom = 4;
 /// Pictures of a cache are smooth but for direct light: their first one may take three times as long and be finer.
 constexpr double kFinerStart = 1.0 / 3.0;
 
+/// Passes for the pixels that an edit left without samples, before those are asked that seem untouched.
+constexpr uint32_t kCaughtUp = 6;
+
 InstanceMask local_view_mask(const Scene& scene, const std::vector<uint32_t>& handles) {
   InstanceMask mask(scene.instances().size() / 64 + 1, 0);
   for (uint32_t handle : handles) {
@@ -28,6 +31,17 @@ InstanceMask local_view_mask(const Scene& scene, const std::vector<uint32_t>& ha
     mask[index / 64] |= uint64_t(1) << (index % 64);
   }
   return mask;
+}
+
+std::vector<PixelNoise> noise_of(const Film& film) {
+  std::vector<PixelNoise> pixels(size_t(film.width()) * film.height());
+  for (size_t p = 0; p < pixels.size(); ++p) pixels[p] = film.noise(p);
+  return pixels;
+}
+
+BelievedError spread_of(const Film& film) {
+  const float spread = film.spread();
+  return {spread, spread, spread};
 }
 
 }  // namespace
@@ -85,17 +99,31 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
   const ScheduleOptions options{before + settings.samples, settings.viewport, settings.time_limit > 0.0f,
                                 coarsest_step(pixels, sample_seconds_ * (renderer.exact() ? 1.0 : kFinerStart))};
   bool shown_filtered = false;
+  const bool carries = film.carries();
+  if (carries) film.begin_asking();
+  uint32_t caught_up = 0;
   uint32_t done = before;
   double in_passes = 0.0, at_last_publish = 0.0;
   for (uint32_t index = 0; !stop_; ++index) {
     const PassPlan plan = plan_pass(options, index, done);
-    if (!plan.count || limit_reached(in_passes, settings.time_limit, done - before, plan.count)) break;
+    const bool rest_waits = carries && film.rest_waits();
+    if ((!plan.count && !rest_waits) || limit_reached(in_passes, settings.time_limit, done - before, plan.count)) break;
     work.pass = index;
     begun = now();
-    const std::vector<PixelRequest> requests = pass_requests(plan, f.x0, f.y0, f.x1, f.y1);
+    bool asks = carries && (settings.viewport ? index < 32 && options.coarsest >> index : index == 0);
+    std::vector<PixelRequest> requests = carries && !asks ? catch_up_requests(film)
+                                         : asks ? pass_requests({0, 1, plan.step, plan.skip}, f.x0, f.y0, f.x1, f.y1)
+                                                : pass_requests(plan, f.x0, f.y0, f.x1, f.y1);
+    if (carries) {
+      const bool rest = !asks && rest_waits && (caught_up++ >= kCaughtUp || !plan.count);
+      if (rest) requests = waiting_requests(film), film.ask_the_rest();
+      if (asks) std::erase_if(requests, [&](const PixelRequest& r) { return !film.wants(r); });
+      asks |= rest;
+    }
     renderer.render(*scene_, requests, film, work);
     if (stop_) break;
-    if (plan.step == 1) done = plan.first + plan.count;
+    if (asks) film.end_asking(plan.step);
+    if (plan.step == 1) done = carries ? least_samples(film) : plan.first + plan.count;
     if (renderer.extra() > 0.0f && plan.step == 1) {
       work.extra = true;
       renderer.render(*scene_, extra_requests(film, renderer.extra()), film, work);
@@ -108,8 +136,8 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     for (const PixelRequest& request : requests) samples += sample_count(request);
     if (samples >= kSamplesToTime && !paused_) sample_seconds_ = seconds / double(samples);
     BelievedError noise;
-    if (plan.step == 1 && (error_is_due(done) || (done >= 2 && done >= settings.samples)))
-      noise = film.believed_error();
+    const bool due = error_is_due(done) || (done >= 2 && done >= settings.samples);
+    if (plan.step == 1 && due) noise = carries ? spread_of(film) : film.believed_error();
     {
       const std::lock_guard lock(mutex_);
       film_step_ = plan.step;
@@ -119,7 +147,9 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
       for (const auto& [name, value] : renderer.statistics().values) statistics_.method_values[name] = value;
       if (statistics_.passes.size() < 4096) statistics_.passes.push_back({plan.first, plan.count, plan.step, seconds});
     }
-    const bool last = !plan_pass(options, index + 1, done).count;
+    const bool last = !plan_pass(options, index + 1, done).count && !(carries && film.rest_waits());
+    if (carries && settings.viewport && plan.step == 1 && (done <= 1 || last || now() - at_last_publish > 0.05))
+      film.smooth(relative_deviations(noise_of(film), film.width(), film.height()), settings.threads, work.stop);
     if (settings.viewport) {
       const bool filter_now = settings.denoise && plan.step == 1 && (std::has_single_bit(done) || last);
       if (filter_now) {
@@ -133,6 +163,8 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     if (settings.accuracy > 0.0f && error_may_stop(done) && noise.value >= 0.0f && noise.value <= settings.accuracy)
       break;
   }
+  if (!stop_ && carries && !settings.viewport)
+    film.smooth(relative_deviations(noise_of(film), film.width(), film.height()), settings.threads, work.stop);
   if (!stop_ && settings.denoise && done && !settings.viewport) publish(settings, film, 1, true);
   if (!stop_ && settings.viewport && !shown_filtered && done) publish(settings, film, 1, false);
   return done;

@@ -26,6 +26,7 @@ struct RenderSettings {
   double frame = 0.0;
   uint32_t threads = 0;
   bool viewport = false, denoise = false;
+  bool carry_over = false;  // samples outlive edits of the scene and, in final renders, frames
   std::string denoiser = "AUTO";
   std::vector<std::string> denoiser_search;  // folders where a copy may lie
   bool local_view_set = false;
@@ -33,6 +34,8 @@ struct RenderSettings {
 
   /// Takes named values over; throws InvalidInput and then leaves everything as it was.
   void apply(const NamedValues&);
+  /// Whether every sample of the same scene is the same.
+  bool same_samples(const RenderSettings&) const;
 };
 
 }  // namespace afterglow

@@ -19,6 +19,7 @@ namespace {
 constexpr uint64_t kMostSamples = 1u << 18;  // of one wavefront: about 50 MB of questions
 constexpr size_t kMostRequests = 1u << 15;
 constexpr size_t kGatherBlock = 512;
+constexpr uint32_t kCarriedLights = 4;
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -250,13 +251,19 @@ void finish(std::span<const PixelRequest> requests, Film& film, Wavefront& wave,
         return sum;
       };
       const FilmSettings& f = film.settings();
-      size_t pixel = 0;
+      size_t pixel = 0, next = 0;
       for (uint32_t y = request.y; y < uint32_t(request.y) + request.height; y += request.step)
         for (uint32_t x = request.x; x < uint32_t(request.x) + request.width; x += request.step) {
           if (request.skip && (x - f.x0) % request.skip == 0 && (y - f.y0) % request.skip == 0) continue;
           float* sums = r.sums.data() + floats * pixel;
           if (request.extra) std::fill_n(sums + film.layout()[Pass::kBatches], kBatchCount, 0.0f);
           film.add(x, y, sums, request.count, squares(pixel), request.extra);
+          for (; film.asks() && next < r.questions.size() && r.questions[next].pixel == pixel; ++next) {
+            const CachePoint& p = wave.points[wave.first[i] + next];
+            if (!p.layer && !p.translucent)
+              film.guide(x, y,
+                         {.position = p.position, .normal = p.normal, .footprint = p.footprint, .segment = p.segment});
+          }
           ++pixel;
         }
       if (work.samples_done && !request.extra) *work.samples_done += sample_count(request);
@@ -287,6 +294,10 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
   const WalkKernel kernel = choose_walk_kernel(scene.effects, film.settings().passes, work.shown);
   const MethodTraits traits = method.traits();
   const uint32_t interleave = traits.interleave;
+  // Kept samples live long: where light sources are asked more often, the noise of a second's work is less.
+  const uint32_t lights = work.extra       ? std::min(1u, traits.lights)
+                          : film.carries() ? std::max(kCarriedLights, traits.lights)
+                                           : traits.lights;
   std::vector<PixelRequest> requests(all.begin(), all.end());
   const bool layers = traits.layers && !work.extra;  // extra samples have no neighbours
   const bool apart = (interleave > 1 || layers) && !work.extra;
@@ -306,8 +317,7 @@ void render_wavefronts(IndirectMethod& method, const CommittedScene& scene, std:
            end - begin < kMostRequests && (!apart || requests[end].first == requests[begin].first));
     const std::span<const PixelRequest> part(requests.data() + begin, end - begin);
     begin = end;
-    walk(input, kernel, part, work.extra ? std::min(1u, traits.lights) : traits.lights, film.keeps_noise(), wave, work,
-         times);
+    walk(input, kernel, part, lights, film.keeps_noise(), wave, work, times);
     if (work.stop.stop()) return;
     answer(method, scene, wave, work, times);
     if (work.stop.stop()) return;

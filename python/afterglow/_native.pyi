@@ -222,6 +222,8 @@ class Session:
         pixel_filter "BLACKMAN_HARRIS"|"GAUSSIAN"|"BOX", filter_width; film_transparent; film_exposure
         passes: names of the passes to keep (below); denoise: bool; denoiser "AUTO"|…
         viewport: bool (start coarse: passes at 1/8, 1/4, 1/2 of the resolution first)
+        carry_over: bool (methods whose answers have no noise: where an edit, or in final renders what changed since the last
+            one, leaves a pixel as it is, its samples stay; `samples` is what every pixel has then; direct light is smoothed)
         mist (start, depth, "quadratic"|"linear"|"inverse_quadratic")
         local_view: instance handles that this view shows, or None."""
     def start(self) -> None: ...

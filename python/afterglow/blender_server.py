@@ -2,7 +2,8 @@
 """Runs inside Blender (or in Python with the module `bpy`) and does jobs that come in as lines of JSON on standard input.
 
 blender -b --python blender_server.py -- FD FOLDER: answers go to the file descriptor FD as lines of JSON, images to FOLDER.
-Jobs: {"op": "open", "file", "percent"}, {"op": "render", "engine", "settings", "multilayer", "out"}, {"op": "memory"},
+Jobs: {"op": "open", "file", "percent"}, {"op": "render", "engine", "settings", "multilayer", "frame", "out"},
+{"op": "animate", "object", "step", "last"}, {"op": "memory"},
 {"op": "grid", "triangles"}, {"op": "save", "file"}, {"op": "script", "file", "arguments"}.
 Started by `afterglow.blenders`; what Blender prints stays on standard output.
 """
@@ -106,6 +107,8 @@ def render(job: dict, folder: str, number: int) -> dict:
     scene.render.filepath = path
     stages = []
     start = time.perf_counter()
+    if "frame" in job:
+        scene.frame_set(job["frame"])
 
     def heard(*words: object) -> None:  # older Blenders give no words
         stages.append((time.perf_counter() - start, str(words[0]) if words and isinstance(words[0], str) else ""))
@@ -122,6 +125,22 @@ def render(job: dict, folder: str, number: int) -> dict:
 
         statistics = {k: v for k, v in afterglow.statistics(scene).items() if k != "passes_log"}
     return {"image": path, "seconds": seconds, "statistics": statistics, "stages": stages[:1000]}
+
+
+def animate(job: dict) -> dict:
+    """Moves an object by a step along x, evenly over all frames."""
+    thing = bpy.data.objects[job["object"]]
+    start = thing.location.x
+    for frame, share in ((1, 0.0), (job["last"], 1.0)):
+        thing.location.x = start + share * job["step"]
+        thing.keyframe_insert("location", index=0, frame=frame)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, job["last"]
+    action = thing.animation_data.action
+    curves = action.fcurves if hasattr(action, "fcurves") else action.layers[0].strips[0].channelbags[0].fcurves
+    for point in curves[0].keyframe_points:
+        point.interpolation = "LINEAR"
+    return {}
 
 
 def script(job: dict) -> dict:
@@ -203,6 +222,8 @@ def main() -> None:
                 result = open_file(job)
             elif kind == "render":
                 result = render(job, folder, number)
+            elif kind == "animate":
+                result = animate(job)
             elif kind == "grid":
                 result = grid(job)
             elif kind == "save":

@@ -167,11 +167,13 @@ class Worker:
         return self.job("open", file=str(Path(file).resolve()), percent=percent)
 
     def render(self, engine: str = "AFTERGLOW", *, as_references: bool = True, multilayer: bool = False, out: str | None = None,
-               persistent: bool = False, **settings: Any) -> dict[str, Any]:
+               persistent: bool = False, frame: int | None = None, **settings: Any) -> dict[str, Any]:
         """{"image": path, "seconds": of the whole render from the opened file, "statistics", "stages": [(second, what the
-        engine said of itself), …]}. persistent: what was read and what methods remember stays for the next render."""
+        engine said of itself), …]}. persistent: what was read and what methods remember stays for the next render. frame:
+        goes there first, which is timed with it."""
+        at = {} if frame is None else {"frame": frame}
         return self.job("render", engine=engine, as_references=as_references, multilayer=multilayer, out=out,
-                        persistent=persistent, settings=settings)
+                        persistent=persistent, settings=settings, **at)
 
     def close(self) -> None:
         if self.process.poll() is None and self.process.stdin is not None:

@@ -199,7 +199,7 @@ def test_a_divided_pass_is_judged_where_its_noise_allows() -> None:
 
 def test_the_instant_cache_has_a_figure_for_every_row_of_its_table() -> None:
     assert set(bench.SETS["instant_cache"]) == {"first_frame", "animation", "whole_frame", "rays", "difference", "after_edits",
-                                                "error", "viewport", "flicker", "scaling"}
+                                                "error", "viewport", "flicker", "frames", "scaling"}
 
 
 def test_a_view_rests_when_its_last_far_picture_has_gone() -> None:

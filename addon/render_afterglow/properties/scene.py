@@ -108,6 +108,12 @@ class AfterglowSceneSettings(bpy.types.PropertyGroup):
     filter_width: FloatProperty(
         name="Width", description="Width of the pixel filter", default=1.5, min=0.01, max=10.0, subtype="PIXEL"
     )
+    carry_over: BoolProperty(
+        name="Keep Samples",
+        description="By the instant cache: where an edit or the next frame of an animation changes nothing and the view stands "
+        "still, the samples of before stay, and direct light is smoothed as far as its own noise goes",
+        default=True,
+    )
     preview_samples: IntProperty(
         name="Max Samples",
         description="Samples of every pixel in the viewport at most; 0: go on for ever",
@@ -185,6 +191,7 @@ def session_settings(scene: bpy.types.Scene, viewport: bool) -> dict[str, Any]:
         film_transparent=scene.render.film_transparent,
         denoise=(own.use_preview_denoising if viewport else own.denoise) and not own.poll_denoise(),
         viewport=viewport,
+        carry_over=own.carry_over,
     )
     for name in methods._groups:
         if name.upper() == own.method or own.method == "AUTO":

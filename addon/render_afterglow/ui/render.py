@@ -119,6 +119,7 @@ class AFTERGLOW_RENDER_PT_sampling_viewport(PropertiesPanel, bpy.types.Panel):
         layout.prop(settings, "preview_accuracy")
         layout.prop(settings, "preview_samples", text="Max Samples" if settings.preview_accuracy > 0 else "Samples")
         layout.prop(context.scene.render, "preview_pixel_size", text="Pixel Size")
+        layout.prop(settings, "carry_over")
 
 
 class AFTERGLOW_RENDER_PT_denoise(PropertiesPanel, bpy.types.Panel):

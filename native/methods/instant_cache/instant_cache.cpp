@@ -23,7 +23,7 @@ View view_of(const SettingValue& value) {
 
 class InstantCache final : public IndirectMethod {
  public:
-  MethodTraits traits() const override { return {.fills_holes = true}; }
+  MethodTraits traits() const override { return {.steady = true, .fills_holes = true}; }
 
   void configure(const Settings& settings) override {
     CacheSettings s;

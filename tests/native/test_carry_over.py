@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A viewport's samples outlive edits where these change nothing, and nothing of the old state is left where they do."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import afterglow
+import numpy as np
+from afterglow.scenes import Description, look_at, translate
+from afterglow.scenes.native import Built
+from afterglow.scenes.rooms import cornell_box, diffuse
+from afterglow.scenes.shapes import sphere
+
+SIZE, SAMPLES = 64, 24
+HERE, THERE = (0.5, -0.3, 1.3), (-0.5, -0.3, 1.3)
+SETTINGS: dict[str, Any] = dict(method="INSTANT_CACHE", width=SIZE, height=SIZE, viewport=True, carry_over=True, samples=SAMPLES,
+                                virtual_lights=64, diffuse_bounces=3, accuracy=0.0, cache_accuracy=0.02)
+
+
+def room(place: tuple[float, float, float] = HERE) -> Description:
+    scene = cornell_box()
+    scene.materials["ball"] = diffuse((0.2, 0.3, 0.8))
+    scene.add("Ball", sphere(0.25, 24, 12), "ball", transform=translate(place))
+    return scene
+
+
+class View:
+    def __init__(self, description: Description, **settings: Any) -> None:
+        self.built = Built(description)
+        self.session = afterglow.Session(self.built.scene, {**SETTINGS, **settings})
+        self.session.start()
+        self.session.wait()
+
+    def move(self, place: tuple[float, float, float], wait: bool = True) -> None:
+        with self.session.edit():
+            self.built.scene.set_transforms(self.built.instances["Ball"], np.asarray(translate(place), np.float64)[None])
+            self.built.scene.commit()
+        if wait:
+            self.session.wait()
+
+    def picture(self) -> np.ndarray:
+        return self.session.read("combined")[..., :3]
+
+    def counts(self) -> np.ndarray:
+        return np.squeeze(self.session.read("sample_count"))
+
+
+def truth(*places: tuple[float, float, float]) -> np.ndarray:
+    """Of the last place, with the records of the way there."""
+    view = View(room(places[0]), carry_over=False, samples=512)
+    for place in places[1:]:
+        view.move(place)
+    return view.picture()
+
+
+def distance(picture: np.ndarray, other: np.ndarray) -> float:
+    return float(np.sqrt(((picture - other) ** 2 / (other**2 + 0.01)).mean()))
+
+
+def test_samples_outlive_an_edit_and_the_picture_is_the_new_one() -> None:
+    view = View(room())
+    assert view.counts().min() >= SAMPLES
+    view.move(THERE)
+    kept = view.counts()
+    assert kept.min() >= SAMPLES and (kept > 1.5 * SAMPLES).sum() < kept.size, "what changed was not taken anew"
+    assert (kept > SAMPLES).mean() > 0.2, "nothing was kept"
+    new, old = truth(HERE, THERE), truth(HERE)
+    fresh = View(room(HERE), carry_over=False)
+    fresh.move(THERE)
+    assert distance(view.picture(), new) < 1.25 * distance(fresh.picture(), new)
+    changed = np.abs(new - old).sum(-1) > 0.1
+    ghost = ((view.picture() - new) * (old - new))[changed].sum() / ((old - new)[changed] ** 2).sum()
+    assert abs(ghost) < 0.02, f"{ghost:.1%} of the old picture are left"
+
+
+def test_an_edit_of_nothing_keeps_everything() -> None:
+    view = View(room())
+    before = view.counts()
+    view.move(HERE)
+    assert (view.counts() >= before).all()
+
+
+def test_a_drag_that_interrupts_every_picture_ends_in_the_right_one() -> None:
+    view = View(room())
+    for i in range(12):
+        share = i / 11
+        view.move(tuple((1 - share) * a + share * b for a, b in zip(HERE, THERE, strict=True)), wait=False)
+        time.sleep(0.004 * (i % 4))
+    view.session.wait()
+    new = truth(HERE, THERE)
+    assert distance(view.picture(), new) < 1.3 * distance(View(room(THERE)).picture(), new)
+
+
+def test_there_and_back_again() -> None:
+    view = View(room())
+    for _ in range(3):
+        view.move(THERE)
+        view.move(HERE)
+    new = truth(HERE)
+    assert distance(view.picture(), new) < 1.25 * distance(View(room()).picture(), new)
+
+
+def test_brighter_light_is_seen_everywhere() -> None:
+    view = View(room())
+    before = view.picture()
+    with view.session.edit():
+        view.built.scene.set_light(next(iter(view.built.lights.values())), power=60.0)
+        view.built.scene.commit()
+    view.session.wait()
+    dark = before.sum(-1) < 0.5
+    more = view.picture()[~dark].mean() / before[~dark].mean()
+    assert abs((view.picture()[dark].mean() / before[dark].mean()) / more - 1.0) < 0.1, "shade and light grew apart"
+    assert abs(more - 1.0) > 0.2
+
+
+def test_another_camera_starts_anew() -> None:
+    view = View(room())
+    camera = room().camera
+    with view.session.edit():
+        view.built.scene.set_camera("perspective", np.asarray(look_at((0.3, -3.0, 1.2), (0.0, 0.0, 1.0)), np.float64),
+                                    window=(-0.4, 0.4, -0.4, 0.4))
+        view.built.scene.commit()
+    view.session.wait()
+    assert camera is not None
+    assert view.counts().max() <= 2 * SAMPLES and view.counts().min() >= SAMPLES
+
+
+def test_threads_do_not_matter() -> None:
+    pictures = []
+    for threads in (1, 2):
+        built = Built(room())
+        for place in (HERE, THERE):
+            built.scene.set_transforms(built.instances["Ball"], np.asarray(translate(place), np.float64)[None])
+            built.scene.commit()
+            session = afterglow.Session(built.scene, {**SETTINGS, "viewport": False, "threads": threads})
+            session.start()
+            session.wait()
+        pictures.append(session.read("combined"))
+    assert np.array_equal(*pictures)
+
+
+def test_frames_of_an_animation_keep_what_stands_still() -> None:
+    built = Built(room())
+
+    def frame(place: tuple[float, float, float], seed: int) -> tuple[np.ndarray, np.ndarray, float]:
+        built.scene.set_transforms(built.instances["Ball"], np.asarray(translate(place), np.float64)[None])
+        built.scene.commit()
+        session = afterglow.Session(built.scene, {**SETTINGS, "viewport": False, "seed": seed, "passes": ["combined", "depth"]})
+        session.start()
+        session.wait()
+        rays = session.statistics()["rays"]["camera"]
+        return session.read("combined")[..., :3], np.squeeze(session.read("depth")), float(rays)
+
+    _, _, first_rays = frame(HERE, 1)
+    picture, depth, rays = frame(THERE, 2)
+    assert rays < 0.75 * first_rays, "samples were not kept"
+    _, fresh_depth, _ = (np.squeeze(x) for x in frame(THERE, 3))
+    new, old = truth(HERE, THERE), truth(HERE)
+    changed = np.abs(new - old).sum(-1) > 0.1
+    ghost = ((picture - new) * (old - new))[changed].sum() / ((old - new)[changed] ** 2).sum()
+    assert abs(ghost) < 0.02, f"{ghost:.1%} of the old picture are left"
+    assert np.array_equal(depth, fresh_depth)
+    still, _, rays = frame(THERE, 4)
+    assert distance(still, picture) < 0.02, "a frame in which nothing moves is another picture"
+    assert rays < 0.1 * first_rays
