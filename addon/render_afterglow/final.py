@@ -77,6 +77,7 @@ def render_layer(
     remembers = engine.is_animation and scene.afterglow.method not in FORGETFUL
     persistent = (scene.render.use_persistent_data or remembers) and not engine.is_preview
     native = store.kept(scene, layer) if persistent else None
+    goes_on = native is not None
     if native is None:
         native = NativeScene()
     if persistent:
@@ -96,7 +97,8 @@ def render_layer(
         engine.free_blender_memory()
         del depsgraph
     engine.update_stats("", prefix + "Building the scene")
-    changes = native.scene.commit(flatten=True)
+    # What moves in an animation leaves the common BVH, which else would be built anew for every frame.
+    changes = native.scene.commit(flatten="still" if goes_on else True)
     seconds["commit"] = time.perf_counter() - started - seconds["sync"]
     warnings = native.take_warnings() + list(view.warnings) + list(changes["warnings"])
 

@@ -2,8 +2,8 @@
 """Runs inside Blender (or in Python with the module `bpy`) and does jobs that come in as lines of JSON on standard input.
 
 blender -b --python blender_server.py -- FD FOLDER: answers go to the file descriptor FD as lines of JSON, images to FOLDER.
-Jobs: {"op": "open", "file", "percent"}, {"op": "render", "engine", "settings", "multilayer", "frame", "out"},
-{"op": "animate", "object", "step", "last"}, {"op": "memory"},
+Jobs: {"op": "open", "file", "percent"}, {"op": "render", "engine", "settings", "multilayer", "out"},
+{"op": "frames", "frames", and a render's}, {"op": "animate", "object", "step", "last"}, {"op": "memory"},
 {"op": "grid", "triangles"}, {"op": "save", "file"}, {"op": "script", "file", "arguments"}.
 Started by `afterglow.blenders`; what Blender prints stays on standard output.
 """
@@ -57,10 +57,12 @@ def apply(scene: "bpy.types.Scene", engine: str, settings: dict) -> None:
     if engine == "AFTERGLOW":
         own = scene.afterglow
         # An unnamed setting keeps what the file says, but for these.
+        method = getattr(own, str(settings.get("method", own.method)).lower(), None)  # its own settings
         for name, value in {"time_limit": 0.0, "denoise": False, **settings}.items():
-            if name not in own.bl_rna.properties:  # a property group takes any name in silence
+            owner = next((it for it in (own, method) if it is not None and name in it.bl_rna.properties), None)
+            if owner is None:  # a property group takes any name in silence
                 raise AttributeError(f"{engine} has no setting '{name}'")
-            setattr(own, name, value)
+            setattr(owner, name, value)
         return
     cycles = scene.cycles
     settings = dict(settings)
@@ -82,7 +84,8 @@ def apply(scene: "bpy.types.Scene", engine: str, settings: dict) -> None:
         setattr(cycles, name, value)
 
 
-def render(job: dict, folder: str, number: int) -> dict:
+def prepare(job: dict) -> str:
+    """Settings and outputs of a job's renders. Returns the engine."""
     scene = bpy.context.scene
     settings = dict(job.get("settings", {}))
     if job.get("as_references"):
@@ -102,13 +105,40 @@ def render(job: dict, folder: str, number: int) -> dict:
     image.file_format, image.color_depth = kind, "32"
     if not job.get("multilayer"):
         image.color_mode = "RGB"
-    path = job.get("out") or os.path.join(folder, f"image_{number}.exr")
     scene.render.use_file_extension = False
+    return engine
+
+
+def frames(job: dict, folder: str, number: int) -> dict:
+    """Frames in order, with nothing else changed between them, as in an animation."""
+    prepare(job)
+    scene = bpy.context.scene
+    images, seconds = [], []
+    for frame in job["frames"]:
+        images.append(os.path.join(folder, f"image_{number}_{frame}.exr"))
+        start = time.perf_counter()
+        scene.frame_set(frame)
+        scene.render.filepath = images[-1]
+        bpy.ops.render.render(write_still=True)
+        seconds.append(time.perf_counter() - start)
+    return {"images": images, "seconds": seconds, "statistics": statistics_of(scene)}
+
+
+def statistics_of(scene: "bpy.types.Scene") -> dict:
+    if scene.render.engine != "AFTERGLOW":
+        return {}
+    import afterglow
+
+    return {k: v for k, v in afterglow.statistics(scene).items() if k != "passes_log"}
+
+
+def render(job: dict, folder: str, number: int) -> dict:
+    prepare(job)
+    scene = bpy.context.scene
+    path = job.get("out") or os.path.join(folder, f"image_{number}.exr")
     scene.render.filepath = path
     stages = []
     start = time.perf_counter()
-    if "frame" in job:
-        scene.frame_set(job["frame"])
 
     def heard(*words: object) -> None:  # older Blenders give no words
         stages.append((time.perf_counter() - start, str(words[0]) if words and isinstance(words[0], str) else ""))
@@ -119,12 +149,7 @@ def render(job: dict, folder: str, number: int) -> dict:
         seconds = time.perf_counter() - start
     finally:
         bpy.app.handlers.render_stats.remove(heard)
-    statistics = {}
-    if engine == "AFTERGLOW":
-        import afterglow
-
-        statistics = {k: v for k, v in afterglow.statistics(scene).items() if k != "passes_log"}
-    return {"image": path, "seconds": seconds, "statistics": statistics, "stages": stages[:1000]}
+    return {"image": path, "seconds": seconds, "statistics": statistics_of(scene), "stages": stages[:1000]}
 
 
 def animate(job: dict) -> dict:
@@ -222,6 +247,8 @@ def main() -> None:
                 result = open_file(job)
             elif kind == "render":
                 result = render(job, folder, number)
+            elif kind == "frames":
+                result = frames(job, folder, number)
             elif kind == "animate":
                 result = animate(job)
             elif kind == "grid":

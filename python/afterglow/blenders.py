@@ -167,13 +167,16 @@ class Worker:
         return self.job("open", file=str(Path(file).resolve()), percent=percent)
 
     def render(self, engine: str = "AFTERGLOW", *, as_references: bool = True, multilayer: bool = False, out: str | None = None,
-               persistent: bool = False, frame: int | None = None, **settings: Any) -> dict[str, Any]:
+               persistent: bool = False, **settings: Any) -> dict[str, Any]:
         """{"image": path, "seconds": of the whole render from the opened file, "statistics", "stages": [(second, what the
-        engine said of itself), …]}. persistent: what was read and what methods remember stays for the next render. frame:
-        goes there first, which is timed with it."""
-        at = {} if frame is None else {"frame": frame}
+        engine said of itself), …]}. persistent: what was read and what methods remember stays for the next render."""
         return self.job("render", engine=engine, as_references=as_references, multilayer=multilayer, out=out,
-                        persistent=persistent, settings=settings, **at)
+                        persistent=persistent, settings=settings)
+
+    def frames(self, engine: str, numbers: Sequence[int], *, as_references: bool = True, **settings: Any) -> dict[str, Any]:
+        """Frames in order with persistent data: {"images", "seconds" of each, "statistics" of the last}."""
+        return self.job("frames", engine=engine, frames=list(numbers), as_references=as_references, persistent=True,
+                        settings=settings)
 
     def close(self) -> None:
         if self.process.poll() is None and self.process.stdin is not None:

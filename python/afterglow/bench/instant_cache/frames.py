@@ -34,12 +34,8 @@ def animated(worker: blenders.Worker) -> blenders.Worker:
 
 def rendered(worker: blenders.Worker, engine: str, **settings: Any) -> tuple[list[Any], list[float]]:
     """The frames' pictures and seconds, in order."""
-    pictures, seconds = [], []
-    for frame in FRAMES:
-        answer = worker.render(engine, persistent=True, frame=frame, **settings)
-        pictures.append(images.read(answer["image"]))
-        seconds.append(float(answer["seconds"]))
-    return pictures, seconds
+    answer = worker.frames(engine, FRAMES, **settings)
+    return [images.read(path) for path in answer["images"]], [float(s) for s in answer["seconds"]]
 
 
 def references(context: Context, worker: blenders.Worker) -> list[list[Any]]:
@@ -77,7 +73,7 @@ def measure(context: Context) -> list[Figure]:
         ours.open(scene()[0], PERCENT)
         mine, my_seconds = rendered(animated(ours), "AFTERGLOW", seed=0, **OURS)
     with blenders.Worker.of_official("5.0", addon=False) as theirs:
-        animated(theirs).render("CYCLES", persistent=True, samples=1, denoise=True, frame=1)
+        animated(theirs).frames("CYCLES", (1,), samples=1, denoise=True)
         other, other_seconds = rendered(theirs, "CYCLES", samples=4, denoise=True, seed=0, use_animated_seed=True)
     where = f"country_kitchen 640×360, {LAST} frames"
     errors = {frame: [metrics.halves_relmse(pictures[FRAMES.index(frame)], [part[FRAMES.index(frame)] for part in parts])
