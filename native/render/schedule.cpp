@@ -61,10 +61,11 @@ uint32_t least_samples(const Film& film) {
   return least;
 }
 
-std::vector<PixelRequest> catch_up_requests(Film& film) {
+std::vector<PixelRequest> catch_up_requests(Film& film, uint32_t enough) {
   constexpr uint32_t kSide = 16;
   const FilmSettings& f = film.settings();
-  const uint32_t number = film.next_sample(), least = least_samples(film), most = least + least / 2;
+  const uint32_t number = film.next_sample(), least = least_samples(film);
+  const uint32_t most = std::min(least + least / 2, std::max(enough, 1u) - 1);
   const auto behind = [&](uint32_t x, uint32_t y) {
     return film.samples(size_t(y - f.y0) * film.width() + (x - f.x0)) <= most;
   };

@@ -36,8 +36,8 @@ inline constexpr uint32_t kCoarsestStep = 32;
 std::vector<PixelRequest> pass_requests(const PassPlan&, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1);
 
 /// The next sample for the pixels of a carried film that have fewest: those that an edit left without samples catch up
-/// first, half as many again as the least at a time.
-std::vector<PixelRequest> catch_up_requests(Film&);
+/// first, half as many again as the least at a time. None for pixels that have `enough`.
+std::vector<PixelRequest> catch_up_requests(Film&, uint32_t enough);
 uint32_t least_samples(const Film&);
 /// The asked sample of the pixels that were left for later.
 std::vector<PixelRequest> waiting_requests(const Film&);

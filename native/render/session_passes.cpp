@@ -111,7 +111,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     work.pass = index;
     begun = now();
     bool asks = carries && (settings.viewport ? index < 32 && options.coarsest >> index : index == 0);
-    std::vector<PixelRequest> requests = carries && !asks ? catch_up_requests(film)
+    std::vector<PixelRequest> requests = carries && !asks ? catch_up_requests(film, settings.samples)
                                          : asks ? pass_requests({0, 1, plan.step, plan.skip}, f.x0, f.y0, f.x1, f.y1)
                                                 : pass_requests(plan, f.x0, f.y0, f.x1, f.y1);
     if (carries) {
