@@ -13,7 +13,7 @@ namespace afterglow {
 namespace {
 
 /// Square of one sample's noise in units of its brightness, about: what a change is weighed against.
-constexpr float kNoise = 0.25f;
+constexpr float kNoise = 0.1f;
 /// Old samples never weigh more than this many: what no sample told of an edit fades.
 constexpr uint32_t kMostKept = 256;
 constexpr float kQuiet = 0.02f;  // change that may wait to be looked at closely

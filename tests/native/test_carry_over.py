@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from typing import Any
 
 import afterglow
 import numpy as np
+import pytest
 from afterglow.scenes import Description, look_at, translate
 from afterglow.scenes.native import Built
 from afterglow.scenes.rooms import cornell_box, diffuse
@@ -43,13 +45,18 @@ class View:
     def picture(self) -> np.ndarray:
         return self.session.read("combined")[..., :3]
 
+    def rays(self) -> float:
+        """Camera rays since the last edit."""
+        return float(self.session.statistics()["rays"]["camera"])
+
     def counts(self) -> np.ndarray:
         return np.squeeze(self.session.read("sample_count"))
 
 
+@functools.cache
 def truth(*places: tuple[float, float, float]) -> np.ndarray:
     """Of the last place, with the records of the way there."""
-    view = View(room(places[0]), carry_over=False, samples=512)
+    view = View(room(places[0]), carry_over=False, samples=256)
     for place in places[1:]:
         view.move(place)
     return view.picture()
@@ -59,20 +66,25 @@ def distance(picture: np.ndarray, other: np.ndarray) -> float:
     return float(np.sqrt(((picture - other) ** 2 / (other**2 + 0.01)).mean()))
 
 
+def ghost(picture: np.ndarray, old: np.ndarray, new: np.ndarray) -> float:
+    """How much of the way back to the old picture it is, where the two differ."""
+    changed = np.abs(new - old).sum(-1) > 0.1
+    return float(((picture - new) * (old - new))[changed].sum() / ((old - new)[changed] ** 2).sum())
+
+
 def test_samples_outlive_an_edit_and_the_picture_is_the_new_one() -> None:
     view = View(room())
     assert view.counts().min() >= SAMPLES
     view.move(THERE)
-    kept = view.counts()
-    assert kept.min() >= SAMPLES and (kept > 1.5 * SAMPLES).sum() < kept.size, "what changed was not taken anew"
-    assert (kept > SAMPLES).mean() > 0.2, "nothing was kept"
+    assert view.counts().min() >= SAMPLES
+    assert view.rays() < 0.75 * SAMPLES * SIZE * SIZE, "nothing was kept"
     new, old = truth(HERE, THERE), truth(HERE)
     fresh = View(room(HERE), carry_over=False)
     fresh.move(THERE)
     assert distance(view.picture(), new) < 1.25 * distance(fresh.picture(), new)
-    changed = np.abs(new - old).sum(-1) > 0.1
-    ghost = ((view.picture() - new) * (old - new))[changed].sum() / ((old - new)[changed] ** 2).sum()
-    assert abs(ghost) < 0.02, f"{ghost:.1%} of the old picture are left"
+    # Fewer samples have fewer records: what is off without any old sample is no ghost.
+    left = ghost(view.picture(), old, new) - ghost(fresh.picture(), old, new)
+    assert abs(left) < 0.01, f"{left:.1%} of the old picture are left"
 
 
 def test_an_edit_of_nothing_keeps_everything() -> None:
@@ -80,8 +92,10 @@ def test_an_edit_of_nothing_keeps_everything() -> None:
     before = view.counts()
     view.move(HERE)
     assert (view.counts() >= before).all()
+    assert view.rays() <= 1.05 * SIZE * SIZE
 
 
+@pytest.mark.slow
 def test_a_drag_that_interrupts_every_picture_ends_in_the_right_one() -> None:
     view = View(room())
     for i in range(12):
@@ -93,6 +107,7 @@ def test_a_drag_that_interrupts_every_picture_ends_in_the_right_one() -> None:
     assert distance(view.picture(), new) < 1.3 * distance(View(room(THERE)).picture(), new)
 
 
+@pytest.mark.slow
 def test_there_and_back_again() -> None:
     view = View(room())
     for _ in range(3):
@@ -157,10 +172,8 @@ def test_frames_of_an_animation_keep_what_stands_still() -> None:
     picture, depth, rays = frame(THERE, 2)
     assert rays < 0.75 * first_rays, "samples were not kept"
     _, fresh_depth, _ = (np.squeeze(x) for x in frame(THERE, 3))
-    new, old = truth(HERE, THERE), truth(HERE)
-    changed = np.abs(new - old).sum(-1) > 0.1
-    ghost = ((picture - new) * (old - new))[changed].sum() / ((old - new)[changed] ** 2).sum()
-    assert abs(ghost) < 0.02, f"{ghost:.1%} of the old picture are left"
+    left = ghost(picture, truth(HERE), truth(HERE, THERE))
+    assert abs(left) < 0.03, f"{left:.1%} of the old picture are left"
     assert np.array_equal(depth, fresh_depth)
     still, _, rays = frame(THERE, 4)
     assert distance(still, picture) < 0.02, "a frame in which nothing moves is another picture"
