@@ -13,6 +13,7 @@ void VirtualLightSettings::configure(const Settings& settings) {
     if (name == "virtual_lights") count = uint32_t(std::clamp<int64_t>(integer_of(value), 1, 1 << 20));
     if (name == "light_pattern") pattern = uint32_t(integer_of(value));
     if (name == "light_bound") bound = std::max(float(number_of(value)), 0.0f);
+    if (name == "light_compensation") short_rays = uint32_t(std::clamp<int64_t>(integer_of(value), 0, 1024));
     if (name == "interleave") interleave = integer_of(value) != 0;
   }
 }
@@ -25,6 +26,10 @@ void VirtualLightSettings::describe(std::vector<SettingDescription>& settings) {
        "How far around a virtual light its light is faded out, against bright spots in corners: 1 is the "
        "mean distance of virtual lights; 0: not at all",
        "", 2.0, 0.0, 16.0});
+  settings.push_back({"light_compensation", "Short Rays",
+                      "Rays that look for the light that the bound takes away, at each record or pixel (16 to 64 for "
+                      "dark corners and thin things); 0: it is left out",
+                      "", int64_t(0), 0.0, 1024.0});
   settings.push_back({"light_pattern", "Pattern",
                       "Which points the light paths take; another number, another set of lights", "", int64_t(0), 0.0,
                       2147483647.0});

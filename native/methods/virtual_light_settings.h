@@ -11,6 +11,7 @@ struct VirtualLightSettings {
   uint32_t count = 256, pattern = 0;
   float bound = 2.0f;
   bool interleave = true;
+  uint32_t short_rays = 0;  // that gather what the bound cuts away
 
   void configure(const Settings&);
   static void describe(std::vector<SettingDescription>&);

@@ -25,7 +25,8 @@ constexpr int kMostPassages = 16;
 constexpr double kPassing =
     0.25;                  // of the chances come from places where importance passes, the others where it arrives
 constexpr int kSteps = 4;  // of chances, each a quarter of the one before
-constexpr uint32_t kTries = 128;  // places of a path
+constexpr float kUnreached = 0.25f;  // chance of a light where no importance was seen to pass
+constexpr uint32_t kTries = 128;     // places of a path
 
 /// Goes through what has no diffuse lobe. False: nothing was met.
 bool next_surface(const WalkScene& walk, Ray& ray, PathContext& context, SurfacePoint& point, RayCounts& counts) {
@@ -146,6 +147,9 @@ void LightImportance::build(const WalkScene& walk, const Viewpoint& from, uint32
     for (const auto& [at, weight] : ended) arrives[at] += weight;
   });
   if (met < kFewest) return;
+  reached_.resize(passes.size());
+  for (size_t i = 0; i < passes.size(); ++i)
+    reached_[i] = passes[i] >= 2.0f * kWeights[0] ? 1.0f : passes[i] > 0.0f ? 0.5f : kUnreached;
   smooth(passes), smooth(arrives);
   const double through = total(passes), into = total(arrives);
   if (!(into > 0.0)) return;
@@ -178,6 +182,11 @@ bool LightImportance::sample(uint32_t seed, uint32_t path, Vec3& place) const {
     if (u[3] < chance_[cell(place)]) return true;
   }
   return false;
+}
+
+/// Looked up a cell before the surface: behind a thin wall there may be another place.
+float LightImportance::at(const Vec3& position, const Vec3& normal) const {
+  return std::max(reached_[cell(position + size_ * normal)], reached_[cell(position + 2.0f * size_ * normal)]);
 }
 
 /// From cell to cell (Amanatides and Woo 1987).

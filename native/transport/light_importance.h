@@ -31,10 +31,14 @@ class LightImportance {
   /// The integral of that density along a line: how dense lines through sampled places are, an area across them.
   float along(const Vec3& origin, const Vec3& direction, float length) const;
 
+  /// How much light matters on a surface, on the side of its normal: 1, 1/2, 1/4.
+  float at(const Vec3& position, const Vec3& normal) const;
+
  private:
   size_t cell(const Vec3&) const;
-  std::vector<float> chance_;  // to be taken, of each cell: 1, 1/4, …
-  float density_ = 0.0f;       // a volume, where the chance is 1
+  std::vector<float> chance_;   // to be taken, of each cell: 1, 1/4, …
+  std::vector<float> reached_;  // what at() says
+  float density_ = 0.0f;        // a volume, where the chance is 1
   Vec3 lower_{0.0f};
   float size_ = 1.0f;  // of a cell
 };

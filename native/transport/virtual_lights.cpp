@@ -13,7 +13,8 @@ namespace afterglow {
 namespace {
 
 constexpr uint32_t kStartDimensions = 8, kBounceDimensions = 8;
-constexpr uint32_t kBeginnings = 4, kFarBeginnings = 16;  // of a path, one of which is gone on with
+constexpr uint32_t kBeginnings = 4, kFarBeginnings = 24;  // of a path, one of which is gone on with
+constexpr uint32_t kWays = 8;                             // from a surface that such a path met, one of which it goes
 constexpr float kWhole = 0.25f;    // of the rays from far away go anywhere, the others where light matters
 constexpr int kMostPassages = 64;  // mirrors, glass and transparent surfaces between two diffuse ones
 
@@ -61,7 +62,11 @@ class LightPath {
       VirtualLight light;
       const bool more = begin(point, light);
       if (!light.alive) continue;
+      const float chance = importance_ ? matters(light) : 1.0f;
+      if (chance < 1.0f && unit_float(hash(point.seed, point.index, 0x51du)) >= chance) continue;
       if (alive++ > 0) continue;
+      light.front /= chance, light.back /= chance;
+      vertex_.throughput /= chance;
       first = light, goes_on = more, chosen_point = point;
       chosen.take(*this);
     }
@@ -69,9 +74,17 @@ class LightPath {
     out[plan_.first[0] + path] = first;
     take(chosen);
     Sampler sampler(chosen_point.seed, chosen_point.index);
-    for (uint32_t bounce = 1; goes_on && bounce < plan_.paths.size() && path < plan_.paths[bounce]; ++bounce) {
-      sampler.set_dimension(kStartDimensions + kBounceDimensions * bounce);
-      goes_on = next_light(sampler, 1.0f / float(plan_.paths[bounce]), out[plan_.first[bounce] + path]);
+    for (uint32_t bounce = 1; bounce < plan_.paths.size() && path < plan_.paths[bounce]; ++bounce) {
+      VirtualLight& light = out[plan_.first[bounce] + path];
+      const uint32_t dimension = kStartDimensions + kBounceDimensions * bounce;
+      const float share = 1.0f / float(plan_.paths[bounce]);
+      if (importance_) {
+        if (!choose_way(chosen_point, dimension, share, light)) break;
+        continue;
+      }
+      if (!goes_on) break;
+      sampler.set_dimension(dimension);
+      goes_on = next_light(sampler, share, light);
     }
     return alive;
   }
@@ -122,10 +135,47 @@ class LightPath {
     return true;
   }
 
+  float matters(const VirtualLight& light) const {
+    const float front = importance_->at(light.position, light.normal);
+    return is_black(light.back) ? front : std::max(front, importance_->at(light.position, -light.normal));
+  }
+
+  /// From the last surface on: of several ways one, by how much light matters where they end, with the strength of the
+  /// mean of all (Talbot 2005, resampled importance sampling). Under the sky most ways end nowhere. False: all did.
+  bool choose_way(const PathPoint& at, uint32_t dimension, float share, VirtualLight& light) {
+    const LightPath here = *this;
+    float weights = 0.0f, chosen_weight = 0.0f;
+    LightPath chosen = *this;
+    for (uint32_t i = 0; i < kWays; ++i) {
+      take(here);
+      throughput_ = vertex_.throughput, context_ = vertex_.context;
+      Sampler sampler(i ? hash(at.seed, i, 0x3a9u) : at.seed, at.index);
+      sampler.set_dimension(dimension - kBounceDimensions + 4);
+      const float u_choice = sampler.next1(), u_lobe = sampler.next1();
+      const Vec2 u = sampler.next2();
+      VirtualLight found;
+      sampler.set_dimension(dimension);
+      if (!scatter(vertex_.surface, vertex_.shares, vertex_.point, u_lobe, u)) continue;
+      next_light(sampler, share, found);
+      if (!found.alive) continue;
+      const float weight = matters(found);
+      weights += weight;
+      if (u_choice * weights >= weight) continue;
+      chosen.take(*this), chosen_weight = weight, light = found;
+    }
+    if (!(weights > 0.0f)) return false;
+    take(chosen);
+    const float strength = weights / (float(kWays) * chosen_weight);
+    light.front *= strength, light.back *= strength;
+    vertex_.throughput *= strength;
+    return true;
+  }
+
   /// Stands where another path stands.
   void take(const LightPath& other) {
     from_ = other.from_, ray_ = other.ray_, context_ = other.context_;
     throughput_ = other.throughput_, first_ = other.first_, guided_ = other.guided_;
+    if (importance_) vertex_ = other.vertex_;
   }
 
   /// Goes on to the next surface with a diffuse lobe and leaves a light there. False: the path ended.
@@ -160,6 +210,10 @@ class LightPath {
         continue;
       }
       leave_light(point, shares, share, light);
+      if (importance_) {  // its ways are chosen later
+        vertex_ = {surface, shares, point, throughput_, context_};
+        return true;
+      }
       return scatter(surface, shares, point, u_lobe, u);
     }
     return false;
@@ -257,7 +311,14 @@ class LightPath {
   PathContext context_;
   Rgb throughput_{1.0f};
   bool first_ = true, guided_ = false;  // the density of its way is not yet known
-  float passes_ = 0.0f;                 // how far along its first ray the place lies that it was to pass
+  struct Vertex {
+    Surface surface;  // its lobes that are not diffuse
+    Shares shares;
+    SurfacePoint point;
+    Rgb throughput{1.0f};
+    PathContext context;
+  } vertex_;             // where the last light was left
+  float passes_ = 0.0f;  // how far along its first ray the place lies that it was to pass
 };
 
 /// The share of beginnings that met something. Where few do it is that of all paths, and the paths that have one stand

@@ -9,8 +9,8 @@ from typing import Any
 import afterglow
 import numpy as np
 import pytest
-from afterglow.scenes import Camera, Description, Light, look_at, rotate, translate
-from afterglow.scenes.native import Built
+from afterglow.scenes import Camera, Description, Light, Object, look_at, node, rotate, translate
+from afterglow.scenes.native import Built, graph
 from afterglow.scenes.rooms import background, diffuse
 from afterglow.scenes.shapes import box, join, quad, sphere
 from hard_cases import Mean, agree, render
@@ -103,3 +103,55 @@ def test_threads_leave_beginnings_alone() -> None:
     images = [render(windowed_room(), **{**SETTINGS, "method": "INSTANT_CACHE", "samples": 2, "threads": threads}).image
               for threads in (1, 2)]
     assert np.array_equal(*images)
+
+
+@pytest.mark.parametrize(("method", "scene"), [("INSTANT_RADIOSITY", "corner"), ("INSTANT_CACHE", "corner"),
+                                               ("INSTANT_RADIOSITY", "slats")])
+def test_short_rays_bring_back_what_the_bound_takes(method: str, scene: str) -> None:
+    """Corners and thin things have the path tracer's light again, and without short rays they have much less."""
+    made = corner() if scene == "corner" else slats()
+    settings: dict[str, Any] = dict(diffuse_bounces=2, max_bounces=2, samples=8)  # the lights count translucence as a bounce
+    truth = indirect(made, 4, method="PATH_TRACING", **{**settings, "samples": 256})
+    wide: dict[str, Any] = dict(method=method, virtual_lights=256, light_bound=4.0, **settings)
+    without, found = (indirect(made, 10, light_compensation=rays, **wide) for rays in (0, 64))
+    agree(found, truth, tolerance=0.02)
+    assert without.value < 0.85 * truth.value and found.error < 0.06 * truth.value
+
+
+def corner() -> Description:
+    """Where two walls and the floor of a lit box meet."""
+    scene = Description("corner", Camera(look_at((-0.4, -0.4, 0.6), (-1, -1, 0)), math.radians(40)))
+    scene.materials["white"] = diffuse((0.7, 0.7, 0.7))
+    scene.add("Room", box((-1, -1, 0), (1, 1, 2), inward=True), "white")
+    scene.lights = [Light("L", "area", look_at((0, 0, 1.9), (0, 0, 0), (0, 1, 0)), 25.0, size=(0.6, 0.6))]
+    return scene
+
+
+def slats() -> Description:
+    """Translucent slats, a millimetre thick and a few centimetres apart, in the sun."""
+    scene = Description("slats", Camera(look_at((1.0, 0, 0.5), (0, 0, 0.5)), math.radians(40)))
+    scene.materials.update(slat=node("mix_shader", fac=0.4, shader=diffuse((0.8, 0.8, 0.8)),
+                                     shader_001=node("translucent_bsdf", color=(0.8, 0.8, 0.8))), white=diffuse((0.7, 0.7, 0.7)))
+    scene.meshes["Slat"] = box((-0.03, -0.6, -0.0005), (0.03, 0.6, 0.0005))
+    places = [translate((0, 0, 0.05 * i)) @ rotate(0.7, "y") for i in range(20)]
+    scene.objects.append(Object("Slat", "Slat", np.array(places), ("slat",)))
+    scene.add("Floor", quad((-2, -2, -0.3), (2, -2, -0.3), (2, 2, -0.3), (-2, 2, -0.3)), "white")
+    scene.lights = [Light("Sun", "sun", look_at((-5, 1.0, 3.5), (0, 0, 0)), 10.0, angle=0.01)]
+    return scene
+
+
+def test_records_with_short_rays_equal_fresh_ones_after_edits() -> None:
+    live = Live(light_compensation=8)
+    built, scene = live.built, live.built.scene
+    edits = [
+        lambda: scene.set_transforms(built.instances["Ball"], translate((-0.5, 0.4, 0.26))[None]),
+        lambda: scene.set_transforms(built.instances["Shed"], translate((0.3, 0, 0))[None]),
+        lambda: scene.set_light(built.lights["Sun"], color=(1, 0.5, 0.2), power=5.0),
+        lambda: scene.set_material(built.materials["ball"], graph(diffuse((0.1, 0.8, 0.1)))),
+        lambda: scene.set_material(built.materials["ball"], graph(node("transparent_bsdf", color=(0.9, 0.5, 0.2)))),
+        lambda: scene.set_instances(built.instances["Ball"], visibility=0),
+        lambda: scene.set_transforms(built.instances["Walls"], rotate(0.1)[None]),
+    ]
+    for change in edits:
+        numbers = live.edit(change)
+        assert numbers["verified_worst"] <= 1e-5 and numbers["verified_records"] > 10 and numbers["resets"] == 1

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <bit>
 #include <chrono>
+#include <utility>
 
 #include "base/parallel.h"
 
@@ -24,7 +25,18 @@ uint32_t round_of(const CachePoint& p) {
 }
 constexpr uint32_t kRounds = 5;
 
+/// The same rays wherever the record's object goes.
+Rgb found_nearby(const ShortRays& rays, const Record& r, std::vector<float>& terms, RayCounts& counts) {
+  const uint32_t seed = hash(r.place.triangle, std::bit_cast<uint32_t>(r.place.u), std::bit_cast<uint32_t>(r.place.v));
+  return rays.gather(r.position, r.normal, r.face_normal, r.error, seed, terms, counts);
+}
+
 }  // namespace
+
+ShortRays Cache::short_rays(const WalkScene& walked) const {
+  const VirtualLightSettings& s = settings_.lights;
+  return {walked, lights_, plan_slots(s.count, s.options(settings_.walk.limits, 0).bounces), bound_, s.short_rays};
+}
 
 Answer Cache::answer(const CachePoint& p) const {
   Answer result;
@@ -139,6 +151,7 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
 uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> which, Work& work) {
   std::atomic<uint64_t> rays{0};
   const WalkScene walked = walk(scene);
+  const ShortRays nearby = short_rays(walked);
   parallel_blocks(
       which.size(), kRecordBlock, work.threads,
       [&](size_t begin, size_t end) {
@@ -146,10 +159,13 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
         Sums sums;
         sums.terms.resize(lights_.padded());
         for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
+          Record& record = records_[which[i]];
+          if (settings_.lights.short_rays && !std::exchange(record.compensated, true))
+            record.compensation = found_nearby(nearby, record, sums.terms, counts);
           ask(walked, which[i], sums.terms.data(), counts);  // leaves the record's terms
           sum(which[i], sums);
         }
-        rays += counts.shadow;
+        rays += counts.shadow + counts.bounce;
       },
       work.stop);
   for (const uint32_t i : which)
@@ -192,6 +208,7 @@ Verification Cache::verify(const CommittedScene& scene, Work& work) const {
   Verification result;
   std::mutex mutex;
   const WalkScene walked = walk(scene);
+  const ShortRays nearby = short_rays(walked);
   parallel_blocks(records_.size(), kRecordBlock, work.threads, [&](size_t begin, size_t end) {
     std::vector<float> terms(lights_.padded());
     RayCounts counts;
@@ -212,6 +229,7 @@ Verification Cache::verify(const CommittedScene& scene, Work& work) const {
         if (visibility_.coloured()) seen = unpack_transmittance(pack_transmittance(seen));
         sum += std::fabs(g) * light * seen;
       }
+      sum += found_nearby(nearby, fresh, terms, counts);
       const Rgb off = glm::abs(sum - stored.irradiance);
       const double relative = double(max_component(off)) / std::max(double(max_component(sum)), 1e-30);
       const std::lock_guard lock(mutex);

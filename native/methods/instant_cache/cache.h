@@ -14,6 +14,7 @@
 #include "methods/walk_settings.h"
 #include "rays/ray_subset.h"
 #include "transport/light_importance.h"
+#include "transport/short_rays.h"
 
 namespace afterglow::instant_cache {
 
@@ -105,6 +106,7 @@ class Cache {
   void find_light(size_t record, Sums&) const;
   void find_brightness(size_t record, Sums&) const;
   float find_radius(size_t record, Sums&) const;
+  ShortRays short_rays(const WalkScene&) const;
   WalkScene walk(const CommittedScene& scene) const {
     return {scene, settings_.walk.limits, shown_.empty() ? nullptr : &shown_, false};
   }

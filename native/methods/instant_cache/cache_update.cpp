@@ -45,6 +45,7 @@ void Cache::configure(const CacheSettings& settings) {
   const CacheSettings& o = settings_;
   stale_ |= !same_walk(settings.walk.limits, o.walk.limits) || settings.lights.count != o.lights.count ||
             settings.lights.pattern != o.lights.pattern || settings.lights.bound != o.lights.bound ||
+            settings.lights.short_rays != o.lights.short_rays ||
             settings.accuracy != o.accuracy;
   settings_ = settings;
   spacing_ = spacing_of(settings.accuracy);
@@ -122,7 +123,8 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
     for (uint32_t w = 0; w < visibility_.words(); ++w)
       any |= unknown[w], counts_.pairs_marked += uint64_t(std::popcount(unknown[w]));
     counts_.pairs += lights_.count;
-    if (any) {
+    records_[i].compensated = false;  // whatever changed, it may be near, or near what short rays meet
+    if (any || settings_.lights.short_rays) {
       records_[i].ready = false;
       if (was_used(i)) waiting.push_back(i);  // the others wait until somebody wants them
     } else if (recoloured) {

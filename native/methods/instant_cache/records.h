@@ -32,6 +32,8 @@ struct Record {
   uint32_t born = 0, asked = 0;            // the updates after which it was made, and rays were last traced for it
   uint32_t rays = 0;                       // so many
   bool ready = false;                      // no visibility is unknown
+  bool compensated = false;                // short rays were traced for its light as it is
+  Rgb compensation{0.0f};                  // what they found; irradiance holds it already
 };
 
 /// Where the place is now. False: the triangle has no area.

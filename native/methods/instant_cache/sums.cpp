@@ -103,9 +103,11 @@ void Cache::sum(size_t index, Sums& sums) {
   find_gradients(index, sums);
   const float here = luminance(record.irradiance);
   record.ready = true;
-  if (std::fabs(here - record.measured) <= kSameLight * record.measured) return;
-  record.radius = find_radius(index, sums);
-  record.measured = here;
+  if (std::fabs(here - record.measured) > kSameLight * record.measured) {
+    record.radius = find_radius(index, sums);
+    record.measured = here;
+  }
+  record.irradiance += record.compensation;
 }
 
 /// As far as the gradient tells the truth, to a tolerance, in four directions: it ends where light bends, as before

@@ -11,6 +11,7 @@
 #include "methods/virtual_light_settings.h"
 #include "methods/walk_settings.h"
 #include "transport/light_importance.h"
+#include "transport/short_rays.h"
 
 namespace afterglow::instant_radiosity {
 
@@ -64,12 +65,18 @@ class InstantRadiosity final : public IndirectMethod {
     RayCounts counts;
     std::vector<float> terms(whole_.padded());
     const WalkScene walked = walk(scene);
+    const VirtualLightSettings& s = lights_settings_;
+    const ShortRays nearby(walked, whole_, plan_slots(s.count, s.options(settings_.limits, 0).bounces), bound_,
+                           s.short_rays);
     for (size_t i = 0; i < points.size(); ++i) {
       const CachePoint& p = points[i];
       const bool shares = lights_settings_.interleave && p.layer == 0 && !p.translucent;
       const uint32_t part = (p.x % kInterleave + kInterleave * (p.y % kInterleave) + p.sample) % kParts;
-      const Rgb e = shares ? float(kParts) * irradiance(walked, parts_[part], p, terms, counts)
-                           : irradiance(walked, whole_, p, terms, counts);
+      Rgb e = shares ? float(kParts) * irradiance(walked, parts_[part], p, terms, counts)
+                     : irradiance(walked, whole_, p, terms, counts);
+      if (s.short_rays)
+        e += nearby.gather(p.position, p.normal, p.face_normal, p.error, hash(hash(p.x, p.y, p.sample), p.layer), terms,
+                           counts);
       answers[i] = {e, 1.0f, 0.0f};
     }
     const std::lock_guard lock(mutex_);
