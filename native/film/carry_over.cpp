@@ -83,13 +83,16 @@ void CarryOver::begin() {
   quiet_.clear();
 }
 
-void CarryOver::find_quiet() {
+void CarryOver::find_quiet(bool all) {
   const size_t rows = (height_ + kQuietBlock - 1) / kQuietBlock;
   std::vector<uint8_t> loud(blocks_ * rows);
   for (uint32_t y = 0; y < height_; y += kQuietStep)
     for (uint32_t x = 0; x < width_; x += kQuietStep) {
       const size_t pixel = size_t(y) * width_ + x;
-      if (known_[pixel] < 2 || change_[pixel] > kQuiet) loud[y / kQuietBlock * blocks_ + x / kQuietBlock] = 1;
+      const PixelChange& found = found_[pixel];
+      const bool other_light = luminance(glm::abs(found.cached)) > kQuiet * found.level;
+      if (known_[pixel] < 2 || change_[pixel] > kQuiet || other_light)
+        loud[y / kQuietBlock * blocks_ + x / kQuietBlock] = 1;
     }
   quiet_.assign(loud.size(), 1);
   for (size_t y = 0; y < rows; ++y)
@@ -97,6 +100,7 @@ void CarryOver::find_quiet() {
       for (size_t j = y ? y - 1 : 0; j <= std::min(y + 1, rows - 1); ++j)
         for (size_t i = x ? x - 1 : 0; i <= std::min(x + 1, blocks_ - 1); ++i)
           if (loud[j * blocks_ + i]) quiet_[y * blocks_ + x] = 0;
+  for (size_t b = ++turn_ % kTurns; b < quiet_.size() && !all; b += kTurns) quiet_[b] = 0;
 }
 
 void CarryOver::follow(size_t pixel, const Rgb& cached) {

@@ -47,13 +47,14 @@ class CarryOver {
   float change(size_t pixel) const { return change_[pixel]; }
   /// After weigh(kQuietStep): blocks of kQuietBlock pixels in which and beside which no asked sample told of a change.
   /// They need not be asked at once: what their nearest asked pixel found of a cache's light stands for them.
-  void find_quiet();
+  /// `all`: else every kTurns-th of them is not left alone, in turns.
+  void find_quiet(bool all);
   bool quiet(uint32_t x, uint32_t y) const {
     return !quiet_.empty() && quiet_[size_t(y / kQuietBlock) * blocks_ + x / kQuietBlock];
   }
   bool some_quiet() const { return !quiet_.empty(); }
   void forget_quiet() { quiet_.clear(); }
-  static constexpr uint32_t kQuietStep = 4, kQuietBlock = 16;
+  static constexpr uint32_t kQuietStep = 4, kQuietBlock = 16, kTurns = 8;
   /// The pixel's samples were set right.
   void settle(size_t pixel) { found_[pixel] = PixelChange{}, change_[pixel] = 0.0f, settled_[pixel] = 1; }
   bool settled(size_t pixel) const { return settled_[pixel]; }
@@ -80,7 +81,7 @@ class CarryOver {
   int combined_, cached_;
   std::vector<float> sums_;  // of the sample, as the last state of the scene had it
   std::vector<uint8_t> asked_, known_, other_before_, settled_, quiet_;
-  size_t blocks_;
+  size_t blocks_, turn_ = 0;
   std::vector<PixelChange> found_;
   std::vector<float> change_;
   std::vector<LayerPixel> guides_;

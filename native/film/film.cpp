@@ -187,9 +187,9 @@ void Film::begin_asking() {
   asking_ = true;
 }
 
-void Film::end_asking(uint32_t step) {
+void Film::end_asking(uint32_t step, bool rest) {
   carry_->weigh(step);
-  if (step == CarryOver::kQuietStep) carry_->find_quiet();
+  if (step == CarryOver::kQuietStep) carry_->find_quiet(rest);
   if (step > 1) return;
   asking_ = false;
   const auto each = [&](const std::function<void(uint32_t, uint32_t, size_t)>& body) {

@@ -92,7 +92,8 @@ class Film {
   void carry_over();
   bool carries() const { return carry_ != nullptr; }
   void begin_asking();
-  void end_asking(uint32_t step);
+  /// rest: what seems untouched will be asked later; else an eighth of it is asked now, another one each time.
+  void end_asking(uint32_t step, bool rest = true);
   bool asks() const { return asking_; }
   /// Whether any pixel of a request has to be asked soon; the others' turn comes with ask_the_rest().
   bool wants(const PixelRequest&) const;

@@ -100,17 +100,20 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
                                 coarsest_step(pixels, sample_seconds_ * (renderer.exact() ? 1.0 : kFinerStart))};
   bool shown_filtered = false;
   const bool carries = film.carries();
+  const bool goes_on = carries && !settings.viewport && least_samples(film) > 0;  // from the frame before
   if (carries) film.begin_asking();
   uint32_t caught_up = 0;
   uint32_t done = before;
   double in_passes = 0.0, at_last_publish = 0.0;
   for (uint32_t index = 0; !stop_; ++index) {
-    const PassPlan plan = plan_pass(options, index, done);
-    const bool rest_waits = carries && film.rest_waits();
+    PassPlan plan = plan_pass(options, index, done);
+    if (goes_on && index < 2)
+      plan = index ? PassPlan{0, 1, 1, CarryOver::kQuietStep} : PassPlan{0, 1, CarryOver::kQuietStep, 0};
+    const bool rest_waits = carries && settings.viewport && film.rest_waits();
     if ((!plan.count && !rest_waits) || limit_reached(in_passes, settings.time_limit, done - before, plan.count)) break;
     work.pass = index;
     begun = now();
-    bool asks = carries && (settings.viewport ? index < 32 && options.coarsest >> index : index == 0);
+    bool asks = carries && (settings.viewport ? index < 32 && options.coarsest >> index : index < (goes_on ? 2u : 1u));
     std::vector<PixelRequest> requests = carries && !asks ? catch_up_requests(film, settings.samples)
                                          : asks ? pass_requests({0, 1, plan.step, plan.skip}, f.x0, f.y0, f.x1, f.y1)
                                                 : pass_requests(plan, f.x0, f.y0, f.x1, f.y1);
@@ -122,7 +125,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     }
     renderer.render(*scene_, requests, film, work);
     if (stop_) break;
-    if (asks) film.end_asking(plan.step);
+    if (asks) film.end_asking(plan.step, settings.viewport);
     if (plan.step == 1) done = carries ? least_samples(film) : plan.first + plan.count;
     if (renderer.extra() > 0.0f && plan.step == 1) {
       work.extra = true;
@@ -147,7 +150,8 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
       for (const auto& [name, value] : renderer.statistics().values) statistics_.method_values[name] = value;
       if (statistics_.passes.size() < 4096) statistics_.passes.push_back({plan.first, plan.count, plan.step, seconds});
     }
-    const bool last = !plan_pass(options, index + 1, done).count && !(carries && film.rest_waits());
+    const bool last =
+        !plan_pass(options, index + 1, done).count && !(carries && settings.viewport && film.rest_waits());
     if (carries && settings.viewport && plan.step == 1 && (done <= 1 || last || now() - at_last_publish > 0.05))
       film.smooth(relative_deviations(noise_of(film), film.width(), film.height()), settings.threads, work.stop);
     if (settings.viewport) {
