@@ -33,6 +33,10 @@ class LightEmission {
   /// Flux that the ray brings to a point that it reached.
   Rgb arriving(const EmittedRay&, const Vec3& position) const;
 
+  bool shadowless(const EmittedRay& ray) const {
+    const Emitter& e = emitters_[ray.emitter];
+    return e.kind == Emitter::kLamp && !lamps_[e.lamp].cast_shadow;
+  }
   /// Rays of one direction from outside of the scene, the one through a place; and the beam's middle and radius.
   void far_through(const Vec3& place, Ray&) const;
   bool in_beam(const Ray& ray) const {

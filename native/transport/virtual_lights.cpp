@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <utility>
 
 #include "base/parallel.h"
 #include "transport/light_importance.h"
@@ -99,7 +100,8 @@ class LightPath {
     const Vec2 place = sampler.next2(), way = sampler.next2();
     if (!emission_.sample(u_choice, place, way, from_)) return false;
     first_ = true;
-    guided_ = importance_ && from_.beam > 0.0f;
+    shadowless_ = emission_.shadowless(from_);
+    guided_ = importance_ && from_.beam > 0.0f && !shadowless_;
     passes_ = 0.0f;
     if (guided_ && unit_float(hash(at.seed, at.index, 0x1a7u)) >= kWhole && !aim(at)) return false;
     ray_ = from_.ray;
@@ -108,8 +110,29 @@ class LightPath {
     context_.drop_glossy = !walk_.limits.caustics_reflective;
     context_.drop_refractive = !walk_.limits.caustics_refractive;
     throughput_ = Rgb(1.0f);
+    if (shadowless_ && !enter(unit_float(hash(at.seed, at.index, 0x5adu)))) return false;
     sampler.set_dimension(kStartDimensions);
     return next_light(sampler, 1.0f / float(plan_.paths[0]), light);
+  }
+
+  /// Light of a lamp without shadows reaches every surface on its way: one of them is chosen, for all.
+  bool enter(float u) {
+    const Ray whole = ray_;
+    std::vector<Ray> before;  // each surface
+    Hit hit;
+    for (int i = 0; i < kMostPassages; ++i) {
+      const Ray at = ray_;
+      counts_.bounce++;
+      if (!walk_.scene.rays.closest(ray_, hit)) break;
+      if (walk_.shows(hit.instance)) before.push_back(at);
+      go_straight(surface_point(walk_.scene.scene, ray_, hit, false));
+    }
+    context_.transparent_depth = 0;
+    ray_ = whole;
+    if (before.empty()) return false;
+    ray_ = before[std::min(size_t(u * float(before.size())), before.size() - 1)];
+    throughput_ *= float(before.size());
+    return true;
   }
 
   /// Sends the ray from far away through a place where light matters.
@@ -198,7 +221,8 @@ class LightPath {
       context_.ray_length = hit.t;
       walk_.scene.materials.shade(walk_.scene.scene, point, context_, surface);
       const float turned = float(hash(uint32_t(passage)) >> 8) * 0x1p-24f;  // one more number for each passage
-      if (passes_straight(surface, std::fmod(u_straight + turned, 1.0f))) {
+      const bool reached = std::exchange(shadowless_, false);               // it is this surface and no other
+      if (!reached && passes_straight(surface, std::fmod(u_straight + turned, 1.0f))) {
         go_straight(point);
         continue;
       }
@@ -206,7 +230,7 @@ class LightPath {
       const Shares shares = take_diffuse(surface);
       const bool has_diffuse = !is_black(shares.front) || !is_black(shares.back) || surface.count == 0;
       if (!has_diffuse) {
-        if (!bounce_on(surface, point, std::fmod(u_lobe + turned, 1.0f), u)) return false;
+        if (reached || !bounce_on(surface, point, std::fmod(u_lobe + turned, 1.0f), u)) return false;
         continue;
       }
       leave_light(point, shares, share, light);
@@ -310,6 +334,7 @@ class LightPath {
   Ray ray_;
   PathContext context_;
   Rgb throughput_{1.0f};
+  bool shadowless_ = false;             // the ray comes from a lamp without shadows
   bool first_ = true, guided_ = false;  // the density of its way is not yet known
   struct Vertex {
     Surface surface;  // its lobes that are not diffuse

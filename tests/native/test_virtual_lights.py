@@ -155,3 +155,30 @@ def test_records_with_short_rays_equal_fresh_ones_after_edits() -> None:
     for change in edits:
         numbers = live.edit(change)
         assert numbers["verified_worst"] <= 1e-5 and numbers["verified_records"] > 10 and numbers["resets"] == 1
+
+
+@pytest.mark.parametrize("lamp", ["area", "sun"])
+def test_lamps_without_shadows_reach_behind_things(lamp: str) -> None:
+    """A lid between the lamp and the floor does not keep its light away, direct or bounced."""
+    scene = Description("lid", Camera(look_at((0, -3.0, 1.6), (0, 0.2, 0.6)), math.radians(50)))
+    scene.materials.update(white=diffuse((0.7, 0.7, 0.7)), red=diffuse((0.8, 0.2, 0.1)))
+    scene.add("Floor", quad((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)), "white")
+    scene.add("Wall", quad((-2, 1.5, 0), (2, 1.5, 0), (2, 1.5, 2), (-2, 1.5, 2)), "red")
+    scene.add("Lid", box((-1.5, -1.5, 1.4), (1.5, 1.4, 1.5)), "white")
+    high = look_at((0.2, 0.1, 2.5), (0, 0, 0), (0, 1, 0))
+    scene.lights = [Light("L", "area", high, 100.0, size=(0.5, 0.5)) if lamp == "area" else Light("L", "sun", high, 3.0, angle=0.1)]
+
+    def made() -> Built:
+        built = Built(scene)
+        built.scene.set_light(built.lights["L"], cast_shadow=False)
+        return built
+
+    def mean(repeats: int, **settings: Any) -> Mean:
+        values = [float(render(made(), seed=i, light_pattern=i, **{**SETTINGS, **settings}).passes["diffuse_indirect"].mean())
+                  for i in range(repeats)]
+        return Mean(float(np.mean(values)), float(np.std(values, ddof=1) / repeats**0.5))
+
+    truth = mean(4, method="PATH_TRACING", samples=256)
+    found = mean(10, method="INSTANT_RADIOSITY", light_bound=0.0, interleave=False, samples=4, virtual_lights=1500)
+    agree(found, truth, tolerance=0.02)
+    assert found.error < 0.05 * found.value
