@@ -21,8 +21,8 @@ FRAMES = (1, 2, 50, 51, 99, 100)
 SHOWN = (1, 50, 100)  # whose error counts
 PARTS, SAMPLES = 2, 64  # of the references
 ERROR = 0.01
-# What reaches the error, or comes nearest to it.
-OURS: dict[str, Any] = {"method": "INSTANT_CACHE", "samples": 8, "accuracy": 0.0, "virtual_lights": 1024}
+# More lights and short rays bring the error down (2048 and 64: 0.02) and cost more time than the goal leaves.
+OURS: dict[str, Any] = {"method": "INSTANT_CACHE", "samples": 8, "accuracy": 0.0, "virtual_lights": 512, "light_compensation": 16}
 
 
 def animated(worker: blenders.Worker) -> blenders.Worker:
