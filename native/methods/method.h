@@ -51,6 +51,7 @@ struct MethodTraits {
 
 struct CachePoint {  // a diffuse lobe that asks for light
   Vec3 position, normal, face_normal, outgoing;
+  Vec3 bent{0.0f};                         // the lobe's normal, which bumps turn away from the surface's
   float footprint = 0.0f, segment = 0.0f;  // of a pixel on the surface; length of the ray that came here
   uint32_t instance = kNone, triangle = kNone;
   float u = 0.0f, v = 0.0f;  // barycentric weights of the triangle's second and third corner

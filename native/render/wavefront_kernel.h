@@ -37,19 +37,26 @@ class AskingVisitor : public path_tracing::FilmVisitor<kPasses> {
   void diffuse(const PathState& path, const SurfacePoint& point, const Surface& surface) {
     if (this->placing_) return;
     Rgb front(0.0f), back(0.0f);
-    for (int i = 0; i < surface.count; ++i)
-      (surface.lobes[i].kind == LobeKind::kTranslucent ? back : front) += surface.lobes[i].weight;
-    if (!is_black(front)) ask(path, point, front, false);
-    if (!is_black(back)) ask(path, point, back, true);
+    Vec3 front_normal(0.0f), back_normal(0.0f);
+    for (int i = 0; i < surface.count; ++i) {
+      const auto& lobe = surface.lobes[i];
+      const bool behind = lobe.kind == LobeKind::kTranslucent;
+      (behind ? back : front) += lobe.weight;
+      (behind ? back_normal : front_normal) += max_component(lobe.weight) * lobe.normal;
+    }
+    if (!is_black(front)) ask(path, point, front, front_normal, false);
+    if (!is_black(back)) ask(path, point, back, back_normal, true);
     if (layer_ < 255) layer_++;
   }
 
  private:
-  void ask(const PathState& path, const SurfacePoint& point, const Rgb& albedo, bool translucent) {
+  void ask(const PathState& path, const SurfacePoint& point, const Rgb& albedo, const Vec3& bent, bool translucent) {
     const float side = translucent ? -1.0f : 1.0f;
     CachePoint ask;
     ask.position = point.position;
     ask.normal = point.normal * side, ask.face_normal = point.face_normal * side;
+    const float length = glm::length(bent);
+    ask.bent = length > 0.0f ? bent * (side / length) : ask.normal;
     ask.outgoing = point.outgoing;
     ask.footprint = path.context.footprint;
     ask.segment = path.context.ray_length;

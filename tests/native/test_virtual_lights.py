@@ -182,3 +182,33 @@ def test_lamps_without_shadows_reach_behind_things(lamp: str) -> None:
     found = mean(10, method="INSTANT_RADIOSITY", light_bound=0.0, interleave=False, samples=4, virtual_lights=1500)
     agree(found, truth, tolerance=0.02)
     assert found.error < 0.05 * found.value
+
+
+def bumped_wall(strength: float) -> Description:
+    scene = Description("bumped", Camera(look_at((0, -3, 0.5), (0, 0, 0.5)), math.radians(35)))
+    wave = node("wave_texture", vector=node("texture_coordinate").out("object"), scale=1.5)
+    bump = node("bump", strength=strength, distance=0.1, height=wave.out("fac"))
+    scene.materials.update(red=diffuse((0.8, 0.2, 0.1)), white=node("diffuse_bsdf", color=(0.8, 0.8, 0.8), normal=bump))
+    scene.add("Floor", quad((-4, -8, -1), (4, -8, -1), (4, 8, -1), (-4, 8, -1)), "red")
+    scene.add("Wall", quad((-2, 0, -0.5), (2, 0, -0.5), (2, 0, 2), (-2, 0, 2)), "white")
+    scene.lights = [Light("L", "point", translate((0, -3, 1)), 500.0)]
+    return scene
+
+
+def test_bumps_bend_bounced_light_without_records_of_their_own() -> None:
+    settings: dict[str, Any] = dict(size=48, passes=["diffuse_indirect"], diffuse_bounces=1, caustics_reflective=False)
+    halves = [render(bumped_wall(1.0), method="PATH_TRACING", samples=256, seed=seed, **settings).passes["diffuse_indirect"]
+              for seed in (1, 2)]
+
+    def shown(method: str, strength: float) -> tuple[float, float]:
+        """Root mean square off, over the mean, free of the reference's noise; and records."""
+        result = render(bumped_wall(strength), method=method, samples=16, virtual_lights=1024, interleave=False, light_bound=0.5,
+                        **settings)
+        image, mean = result.passes["diffuse_indirect"], np.mean(halves)
+        off = float(np.mean((image - halves[0]) * (image - halves[1]), dtype=np.float64))
+        return math.sqrt(max(off, 0.0)) / float(mean), result.statistics["values"].get("records", 0.0)
+
+    smooth, few = shown("INSTANT_CACHE", 1e-4)
+    cached, records = shown("INSTANT_CACHE", 1.0)
+    every, _ = shown("INSTANT_RADIOSITY", 1.0)
+    assert cached < 0.5 * smooth and every < 0.7 * smooth and records <= 1.3 * few, (smooth, cached, every, records, few)

@@ -46,10 +46,14 @@ inline Rgb bounded_light(const Rgb& line, const Rgb& at_record) {
   return glm::clamp(line, 0.5f * at_record, 2.0f * at_record);
 }
 
-/// Light of a record for a point nearby: along its gradients (Ward and Heckbert 1992).
+/// Light of a record for a point nearby: along its gradients (Ward and Heckbert 1992). A bumped lobe's normal is not
+/// the surface's: lights before both count by its cosine with theirs, which is the vector irradiance along it.
 inline Rgb light_at(const Record& r, const CachePoint& p) {
-  return bounded_light(r.irradiance + r.by_step * (p.position - r.position) + r.by_turn * (p.normal - r.normal),
-                       r.irradiance);
+  const Rgb light = bounded_light(
+      r.irradiance + r.by_step * (p.position - r.position) + r.by_turn * (p.normal - r.normal), r.irradiance);
+  if (p.bent == p.normal) return light;
+  const Rgb bumped = light + r.irradiance * (glm::dot(p.bent, p.normal) - 1.0f) + r.by_turn * (p.bent - p.normal);
+  return glm::clamp(bumped, Rgb(0.0f), 2.0f * light);
 }
 
 }  // namespace afterglow::instant_cache

@@ -16,6 +16,8 @@ struct PointGroup {
   Box around;
   float limit = 0.0f;  // the largest radius that any point allows
   float x[kMost], y[kMost], z[kMost], nx[kMost], ny[kMost], nz[kMost], inverse_limit[kMost];
+  float bx[kMost], by[kMost], bz[kMost], bend[kMost];  // by which lobes' normals differ; and their cosine, less 1
+  bool bumped = false;                                 // any does
   uint32_t point[kMost];
 
   /// Whether the point may join without making the group much wider than records are.
@@ -26,7 +28,7 @@ struct PointGroup {
     return max_component(wider.size()) <= 3.0f * limit;
   }
   void begin(uint32_t of_instance) {
-    instance = of_instance, count = 0;
+    instance = of_instance, count = 0, bumped = false;
     around = Box{};
     limit = 0.0f;
   }
@@ -36,6 +38,10 @@ struct PointGroup {
     limit = std::max(limit, reach);
     x[count] = p.position.x, y[count] = p.position.y, z[count] = p.position.z;
     nx[count] = p.normal.x, ny[count] = p.normal.y, nz[count] = p.normal.z;
+    const Vec3 bump = p.bent - p.normal;
+    bx[count] = bump.x, by[count] = bump.y, bz[count] = bump.z;
+    bend[count] = bump == Vec3(0.0f) ? 0.0f : glm::dot(p.bent, p.normal) - 1.0f;
+    bumped |= bend[count] != 0.0f;
     inverse_limit[count] = 1.0f / reach;
     point[count++] = index;
   }
@@ -46,6 +52,7 @@ struct PointGroup {
     for (uint32_t i = count; i < end; ++i) {
       x[i] = y[i] = z[i] = 1e18f;
       nx[i] = ny[i] = nz[i] = inverse_limit[i] = 0.0f;
+      bx[i] = by[i] = bz[i] = bend[i] = 0.0f;
     }
   }
 };
@@ -112,6 +119,17 @@ inline void add_light(const Record& r, const PointGroup& g, const float* weights
     const float sx = r.by_step[0][c], sy = r.by_step[1][c], sz = r.by_step[2][c];
     const float tx = r.by_turn[0][c], ty = r.by_turn[1][c], tz = r.by_turn[2][c];
     float* sum = sums[c];
+    if (g.bumped) {
+      for (uint32_t i = 0; i < size; ++i) {
+        const float line = here + sx * (g.x[i] - at.x) + sy * (g.y[i] - at.y) + sz * (g.z[i] - at.z) +
+                           tx * (g.nx[i] - n.x) + ty * (g.ny[i] - n.y) + tz * (g.nz[i] - n.z);
+        const float light = std::min(std::max(line, low), high);
+        const float turned = light + here * g.bend[i] + tx * g.bx[i] + ty * g.by[i] + tz * g.bz[i];
+        const float bounded = std::min(std::max(turned, 0.0f), 2.0f * light);
+        sum[i] += weights[i] * (g.bend[i] != 0.0f ? bounded : light);
+      }
+      continue;
+    }
     for (uint32_t i = 0; i < size; ++i) {
       const float line = here + sx * (g.x[i] - at.x) + sy * (g.y[i] - at.y) + sz * (g.z[i] - at.z) +
                          tx * (g.nx[i] - n.x) + ty * (g.ny[i] - n.y) + tz * (g.nz[i] - n.z);

@@ -75,7 +75,7 @@ class InstantRadiosity final : public IndirectMethod {
       Rgb e = shares ? float(kParts) * irradiance(walked, parts_[part], p, terms, counts)
                      : irradiance(walked, whole_, p, terms, counts);
       if (s.short_rays)
-        e += nearby.gather(p.position, p.normal, p.face_normal, p.error, hash(hash(p.x, p.y, p.sample), p.layer), terms,
+        e += nearby.gather(p.position, p.bent, p.face_normal, p.error, hash(hash(p.x, p.y, p.sample), p.layer), terms,
                            counts);
       answers[i] = {e, 1.0f, 0.0f};
     }
@@ -99,7 +99,7 @@ class InstantRadiosity final : public IndirectMethod {
 
   Rgb irradiance(const WalkScene& walked, const VirtualLightColumns& lights, const CachePoint& p,
                  std::vector<float>& terms, RayCounts& counts) const {
-    geometry_terms(lights, p.position, p.normal, bound_, terms.data());
+    geometry_terms(lights, p.position, p.bent, bound_, terms.data());
     const Vec3 lifted = p.position + p.error * p.face_normal;
     Rgb sum(0.0f);
     for (uint32_t k = 0; k < lights.count; ++k) {
