@@ -21,4 +21,5 @@ def measure(context: Context) -> list[Figure]:
         theirs = [images.read(worker.render("CYCLES", samples=4, denoise=True, seed=seed)["image"]) for seed in range(FRAMES)]
     mine, rival = (metrics.still_flicker(frames, truth) for frames in (ours, theirs))
     return [Figure("flicker of a still view", "country_kitchen 640×360", 100 * mine.value, "%", "Cycles + OIDN, 4 spp",
-                   100 * rival.value, None, "≤ 0.3", spread=100 * mine.error, note=f"{SAMPLES} samples a pixel, which stay where nothing changes").judged()]
+                   100 * rival.value, None, "≤ 0.3", spread=100 * mine.error,
+                   note=f"{SAMPLES} samples a pixel, which stay where nothing changes").judged()]
