@@ -26,7 +26,8 @@ def windowed_room(*, sun: bool = True, sky: bool = True) -> Description:
         quad((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)), quad((-5, 5, 2.4), (5, 5, 2.4), (5, -5, 2.4), (-5, -5, 2.4)),
         quad((-2, 2, 0), (2, 2, 0), (2, 2, 2.4), (-2, 2, 2.4)), quad((2, -2, 0), (-2, -2, 0), (-2, -2, 2.4), (2, -2, 2.4)),
         quad((-2, -2, 0), (-2, 2, 0), (-2, 2, 2.4), (-2, -2, 2.4)), quad((2, 2, 0), (2, -2, 0), (2, -2, 0.8), (2, 2, 0.8)),
-        quad((2, 2, 0.8), (2, 0.6, 0.8), (2, 0.6, 2.4), (2, 2, 2.4)), quad((2, -0.6, 0.8), (2, -2, 0.8), (2, -2, 2.4), (2, -0.6, 2.4)),
+        quad((2, 2, 0.8), (2, 0.6, 0.8), (2, 0.6, 2.4), (2, 2, 2.4)),
+        quad((2, -0.6, 0.8), (2, -2, 0.8), (2, -2, 2.4), (2, -0.6, 2.4)),
     )
     scene.add("Walls", walls, "white")
     scene.add("Ball", sphere(0.25, 24, 12), "ball", transform=translate((-0.8, 0.6, 0.3)))
@@ -60,7 +61,8 @@ def test_suns_and_skies_through_a_window_bring_the_path_tracers_light(sun: bool,
 class Live:
     def __init__(self, **settings: Any) -> None:
         self.built = Built(windowed_room())
-        fixed = dict(method="INSTANT_CACHE", width=24, height=24, samples=1, virtual_lights=256, cache_verify=True, diffuse_bounces=3)
+        fixed = dict(method="INSTANT_CACHE", width=24, height=24, samples=1, virtual_lights=256, cache_verify=True,
+                     diffuse_bounces=3)
         self.session = afterglow.Session(self.built.scene, {**fixed, **settings})
         self.session.start()
         self.session.wait()
@@ -94,7 +96,7 @@ def test_lights_stay_while_a_view_turns_and_follow_it_into_another_place() -> No
 def test_an_object_that_moves_leaves_most_lights_where_they_are() -> None:
     live = Live()
     for step in range(1, 5):
-        numbers = live.edit(lambda: live.built.scene.set_transforms(
+        numbers = live.edit(lambda step=step: live.built.scene.set_transforms(
             live.built.instances["Ball"], (translate((-0.8 + 0.05 * step, 0.6, 0.3)) @ rotate(0.2 * step))[None]))
         assert numbers["lights_moved"] < 0.15 * 256 and numbers["verified_differing"] == 0, numbers["lights_moved"]
 
@@ -166,7 +168,8 @@ def test_lamps_without_shadows_reach_behind_things(lamp: str) -> None:
     scene.add("Wall", quad((-2, 1.5, 0), (2, 1.5, 0), (2, 1.5, 2), (-2, 1.5, 2)), "red")
     scene.add("Lid", box((-1.5, -1.5, 1.4), (1.5, 1.4, 1.5)), "white")
     high = look_at((0.2, 0.1, 2.5), (0, 0, 0), (0, 1, 0))
-    scene.lights = [Light("L", "area", high, 100.0, size=(0.5, 0.5)) if lamp == "area" else Light("L", "sun", high, 3.0, angle=0.1)]
+    scene.lights = [Light("L", "area", high, 100.0, size=(0.5, 0.5)) if lamp == "area"
+                    else Light("L", "sun", high, 3.0, angle=0.1)]
 
     def made() -> Built:
         built = Built(scene)
