@@ -87,12 +87,18 @@ void answer(IndirectMethod& method, const CommittedScene& scene, Wavefront& wave
     gather(method, scene, wave.points, wave.answers, work);
     return;
   }
-  std::vector<CachePoint> holes;
+  std::span<const CachePoint> holes = wave.points;
   {
     const Stopwatch watch(times.gather);
     gather(method, scene, wave.points, wave.answers, work);
+    wave.holes.clear();
     for (size_t i = 0; i < wave.points.size(); ++i)
-      if (!(wave.answers[i].weight > 0.0f)) holes.push_back(wave.points[i]);
+      if (!(wave.answers[i].weight > 0.0f)) wave.holes.push_back(uint32_t(i));
+    if (wave.holes.size() < wave.points.size()) {
+      wave.hole_points.clear();
+      for (const uint32_t i : wave.holes) wave.hole_points.push_back(wave.points[i]);
+      holes = wave.hole_points;
+    }
   }
   times.holes += holes.size();
   if (holes.empty() || work.stop.stop()) return;

@@ -51,6 +51,8 @@ struct Wavefront {
   std::vector<WalkedRequest> requests;
   std::vector<CachePoint> points;
   std::vector<Answer> answers;
+  std::vector<uint32_t> holes;  // points without an answer
+  std::vector<CachePoint> hole_points;
   std::vector<size_t> first;  // of each request's points
   LayeredFilter filter;
   std::vector<uint8_t> layers;  // of each point

@@ -10,6 +10,7 @@
 namespace afterglow::instant_cache {
 
 void Cache::answer(std::span<const CachePoint> points, std::span<Answer> answers) const {
+  if (records_.empty()) return;  // holes stay holes
   const auto at = [&](uint32_t i) -> const CachePoint& { return points[i]; };
   std::vector<uint32_t> near;
   if (has_fresh_)  // what was answered before may have a nearer record now

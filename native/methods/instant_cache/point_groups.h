@@ -16,8 +16,8 @@ struct PointGroup {
   Box around;
   float limit = 0.0f;  // the largest radius that any point allows
   float x[kMost], y[kMost], z[kMost], nx[kMost], ny[kMost], nz[kMost], inverse_limit[kMost];
-  float bx[kMost], by[kMost], bz[kMost], bend[kMost];  // by which lobes' normals differ; and their cosine, less 1
-  bool bumped = false;                                 // any does
+  bool bumped = false;                                 // any lobe's normal differs; else the next columns are not set
+  float bx[kMost], by[kMost], bz[kMost], bend[kMost];  // by which they differ; and their cosine, less 1
   uint32_t point[kMost];
 
   /// Whether the point may join without making the group much wider than records are.
@@ -38,12 +38,17 @@ struct PointGroup {
     limit = std::max(limit, reach);
     x[count] = p.position.x, y[count] = p.position.y, z[count] = p.position.z;
     nx[count] = p.normal.x, ny[count] = p.normal.y, nz[count] = p.normal.z;
-    const Vec3 bump = p.bent - p.normal;
-    bx[count] = bump.x, by[count] = bump.y, bz[count] = bump.z;
-    bend[count] = bump == Vec3(0.0f) ? 0.0f : glm::dot(p.bent, p.normal) - 1.0f;
-    bumped |= bend[count] != 0.0f;
+    if (p.bent != p.normal) bump(p);
     inverse_limit[count] = 1.0f / reach;
     point[count++] = index;
+  }
+  void bump(const CachePoint& p) {
+    if (!bumped)
+      for (float* column : {bx, by, bz, bend}) std::fill_n(column, kMost, 0.0f);
+    bumped = true;
+    const Vec3 by_bump = p.bent - p.normal;
+    bx[count] = by_bump.x, by[count] = by_bump.y, bz[count] = by_bump.z;
+    bend[count] = glm::dot(p.bent, p.normal) - 1.0f;
   }
   uint32_t padded() const { return (count + kLanes - 1) / kLanes * kLanes; }
   /// Lanes without a point stand where nothing is.
@@ -52,7 +57,6 @@ struct PointGroup {
     for (uint32_t i = count; i < end; ++i) {
       x[i] = y[i] = z[i] = 1e18f;
       nx[i] = ny[i] = nz[i] = inverse_limit[i] = 0.0f;
-      bx[i] = by[i] = bz[i] = bend[i] = 0.0f;
     }
   }
 };
