@@ -2,7 +2,7 @@
 // Records of the instant cache (Debattista et al. 2009, section 3.2): where light was gathered, how much, and for each
 // virtual light whether it was seen. The paper keeps each light's contribution in four bytes; kept here is visibility
 // alone, one bit a light where everything is opaque and 16 bits of coloured transmittance elsewhere. Contributions are
-// recomputed from it, so that sums never drift: with 256 lights a record and its gradients take 277 or 789 bytes.
+// recomputed from it, so that sums never drift: with 256 lights a record and its gradients take 289 or 801 bytes.
 #pragma once
 
 #include <vector>
