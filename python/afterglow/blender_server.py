@@ -3,17 +3,20 @@
 
 blender -b --python blender_server.py -- FD FOLDER: answers go to the file descriptor FD as lines of JSON, images to FOLDER.
 Jobs: {"op": "open", "file", "percent"}, {"op": "render", "engine", "settings", "multilayer", "out"},
-{"op": "frames", "frames", and a render's}, {"op": "animate", "object", "step", "last"}, {"op": "memory"},
-{"op": "grid", "triangles"}, {"op": "save", "file"}, {"op": "script", "file", "arguments"}.
+{"op": "frames", "frames", and a render's}, {"op": "animate", "object", "step", "last"}, {"op": "walk", "stride", "last"},
+{"op": "memory"}, {"op": "grid", "triangles"}, {"op": "save", "file"}, {"op": "script", "file", "arguments"}.
 Started by `afterglow.blenders`; what Blender prints stays on standard output.
 """
 
 import json
+import math
 import os
 import sys
 import time
 
 import bpy
+import mathutils
+import numpy as np
 
 LIGHT_PASSES = ("diffuse_direct", "diffuse_indirect", "diffuse_color", "glossy_direct", "glossy_indirect", "glossy_color",
                 "transmission_direct", "transmission_indirect", "transmission_color", "emit", "environment")
@@ -168,6 +171,33 @@ def animate(job: dict) -> dict:
     return {}
 
 
+def place_on_walk(matrix: "mathutils.Matrix", at: float, stride: float) -> np.ndarray:
+    """A camera's matrix on a closed loop through its own place, without scale, looking left and right. `at` from 0 to 1."""
+    turn = 2 * math.pi * at
+    yaw = 0.2 * math.sin(turn)
+    moved = np.array(matrix, np.float64)
+    moved[:3, :3] /= np.linalg.norm(moved[:3, :3], axis=0)
+    moved[:3, 3] += stride * (math.sin(turn) * moved[:3, 0] - 0.5 * (1 - math.cos(turn)) * moved[:3, 2])
+    across = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
+    moved[:3, :3] = across @ moved[:3, :3]
+    return moved
+
+
+def walk(job: dict) -> dict:
+    """Moves the camera along that loop, a key in each frame."""
+    scene = bpy.context.scene
+    camera, last = scene.camera, job["last"]
+    start = camera.matrix_world.copy()
+    camera.constraints.clear()
+    camera.animation_data_clear()
+    for frame in range(1, last + 1):
+        camera.matrix_world = mathutils.Matrix(place_on_walk(start, (frame - 1) / last, job["stride"]).tolist())
+        camera.keyframe_insert("location", frame=frame)
+        camera.keyframe_insert("rotation_quaternion" if camera.rotation_mode == "QUATERNION" else "rotation_euler", frame=frame)
+    scene.frame_start, scene.frame_end = 1, last
+    return {}
+
+
 def script(job: dict) -> dict:
     """Runs a program that was written to be Blender's only one."""
     import runpy
@@ -196,8 +226,6 @@ def memory() -> dict:
 
 def grid(job: dict) -> dict:
     """An empty file with one smooth sheet of about that many triangles, with UVs, a camera and a sun."""
-    import numpy as np
-
     bpy.ops.wm.read_factory_settings(use_empty=True)
     enable_addon()
     side = max(1, round((job["triangles"] / 2) ** 0.5))
@@ -251,6 +279,8 @@ def main() -> None:
                 result = frames(job, folder, number)
             elif kind == "animate":
                 result = animate(job)
+            elif kind == "walk":
+                result = walk(job)
             elif kind == "grid":
                 result = grid(job)
             elif kind == "save":
@@ -268,4 +298,5 @@ def main() -> None:
         answers.write(json.dumps(result, default=float) + "\n")
 
 
-main()
+if __name__ == "__main__":
+    main()

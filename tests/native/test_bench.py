@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from afterglow import bench, blenders, cache
+from afterglow.bench import animation
 from afterglow.bench.figure import Context, Figure, Pairs, alternate, table
 from afterglow.bench.foundation.kitchen import fewest
 from afterglow.bench.foundation.light_passes import DIVIDED, compare, describe, light_of, resolved
 from afterglow.bench.foundation.sync import staged
+from afterglow.bench.hash_cache.charts import charts
 
 
 @pytest.mark.parametrize(("goal", "value", "holds", "margin"), [
@@ -88,6 +90,26 @@ def test_figures_are_chosen_by_key() -> None:
     assert "camera_path" in bench.chosen("hash_cache", [])
     with pytest.raises(KeyError, match="no figure 'colour'"):
         bench.chosen("foundation", ["colour"])
+
+
+def test_charts_of_the_hash_cache_are_drawn_from_what_was_measured() -> None:
+    """Figures 11 and 17 and table 1 of the paper: each from its own figure, none where nothing was measured."""
+    quality = {"errors": {"1": 0.1, "64": 0.01}, "similarity": {"1": 0.9, "64": 0.99},
+               "path_tracing": {"errors": {"64": 0.2}, "similarity": {"64": 0.8}}}
+    rows = [{"resolution": r, "caching": r * r, "reconstruction": 1.0, "cells": 100 * r} for r in (0.5, 1.0)]
+    table = {str(k): {"cells": 4**k, "density": 0.5**k, "data": 24 * 4**k, "map": 8 * 4**k} for k in range(3)}
+    figures = [{"figure": "path-traced samples that 64 samples are worth, first frame", "details": quality},
+               {"figure": "reconstruction's time over that with the fewest caching paths", "details": {"settings": {"3": rows}}},
+               {"figure": "density of occupied cells at 256³", "details": {"table": table}}, {"figure": "other", "details": {}}]
+    made = charts(figures)
+    assert set(made) == {f"hash_cache_{n}.svg" for n in ("errors", "similarity", "caching", "updated", "density", "memory")}
+    assert all(text.startswith("<svg") and text.count("<polyline") == 2 for name, text in made.items() if "updated" not in name)
+    assert charts(figures[-1:]) == {}
+
+
+def test_an_animation_costs_its_first_frame_and_what_the_others_take() -> None:
+    assert animation.whole([5.0, 1.0, 3.0]) == 5.0 + 99 * 2.0
+    assert animation.whole([1.0] * animation.LAST) == animation.LAST
 
 
 def test_one_failing_figure_does_not_end_the_bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

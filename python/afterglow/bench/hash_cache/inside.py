@@ -9,13 +9,13 @@ ANSWERS.npz: kept images, and "answers", a list of JSON.
 
 import importlib
 import json
-import math
 import resource
 import sys
 import time
 
 import bpy
 import numpy as np
+from blender_server import place_on_walk  # the program that runs this one
 
 jobs_file, answers_file = sys.argv[-2:]
 with open(jobs_file) as file:
@@ -51,11 +51,7 @@ def look(native: "afterglow.Scene", at: "float | None") -> None:
     matrix = np.array(camera.matrix_world, np.float64)
     matrix[:3, :3] /= np.linalg.norm(matrix[:3, :3], axis=0)
     if at is not None:
-        turn, step = 2 * math.pi * at, given["stride"]
-        yaw = 0.2 * math.sin(turn)
-        matrix[:3, 3] += step * (math.sin(turn) * matrix[:3, 0] - 0.5 * (1 - math.cos(turn)) * matrix[:3, 2])
-        across = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
-        matrix[:3, :3] = across @ matrix[:3, :3]
+        matrix = place_on_walk(camera.matrix_world, at, given["stride"])
     projection = camera.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=width, y=height)
     clip = (camera.data.clip_start, camera.data.clip_end)
     native.set_camera("perspective", matrix, window=sync.camera.window_of(projection), clip=clip)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -58,9 +59,19 @@ def halves(at: float | None, samples: int, size: tuple[int, int]) -> list[NDArra
     return [kept["half0"], kept["half1"]]
 
 
-def path_tracing_cost(at: float | None, truth: list[NDArray[np.float32]], size: tuple[int, int],
-                      counts: tuple[int, ...] = (64, 256)) -> tuple[float, dict[int, float]]:
-    """c of the path tracer's error c / N: the mean of error × N over these counts, and the errors."""
+@dataclass
+class Cost:
+    """c of the path tracer's error c / N: the mean of error × N over the counts; errors and MS-SSIM by samples a pixel."""
+
+    c: float
+    errors: dict[int, float]
+    similarity: dict[int, float]
+
+
+def path_tracing_cost(at: float | None, truth: list[NDArray[np.float32]], size: tuple[int, int]) -> Cost:
+    counts = (64, 256)
     _, images = run([render(at, 7, n, f"n{n}", "PATH_TRACING") for n in counts], size)
     errors = {n: metrics.halves_relmse(images[f"n{n}"], truth).value for n in counts}
-    return float(np.mean([error * n for n, error in errors.items()])), errors
+    mean = np.mean(truth, axis=0)
+    return Cost(float(np.mean([error * n for n, error in errors.items()])), errors,
+                {n: metrics.ms_ssim(images[f"n{n}"], mean) for n in counts})
