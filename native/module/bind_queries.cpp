@@ -354,6 +354,30 @@ py::dict measure_lookups(uint64_t cells, uint64_t lookups) {
   return out;
 }
 
+py::array_t<uint64_t> cell_keys(const py::array_t<int64_t, py::array::c_style | py::array::forcecast>& cells) {
+  if (cells.ndim() != 2 || cells.shape(1) != 5) throw InvalidInput("cell_keys: cells must be an array (N, 5)");
+  std::vector<hash_cache::Cell> of;
+  for (py::ssize_t i = 0; i < cells.shape(0); ++i) {
+    const int64_t* c = cells.data(i, 0);
+    of.push_back({int32_t(c[0]), int32_t(c[1]), int32_t(c[2]), uint32_t(c[3]), uint32_t(c[4])});
+  }
+  const std::vector<uint64_t> keys = hash_cache::keys_of(of);
+  return py::array_t<uint64_t>(py::ssize_t(keys.size()), keys.data());
+}
+
+py::dict updated_cell(float light, uint32_t count, const py::handle& sums, uint32_t samples) {
+  const Points given = numbers<double>(sums, "sums", 3);
+  if (!samples) throw InvalidInput("updated_cell: samples must be 1 or more");
+  std::vector<Rgb> all;
+  for (py::ssize_t i = 0; i < given.shape(0); ++i)
+    all.emplace_back(float(given.at(i, 0)), float(given.at(i, 1)), float(given.at(i, 2)));
+  const hash_cache::Updated found = hash_cache::updated_cell(Rgb(light), count, all, samples);
+  py::dict out;
+  out["light"] = py::make_tuple(found.light.x, found.light.y, found.light.z);
+  out["count"] = found.count;
+  return out;
+}
+
 }  // namespace
 
 void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>& scene) {
@@ -375,6 +399,8 @@ void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>&
   m.def("occupied_cells", &occupied_cells, py::arg("scene"), py::arg("levels"), py::arg("points") = py::list(),
         py::arg("threads") = 0);
   m.def("measure_lookups", &measure_lookups, py::arg("cells"), py::arg("lookups"));
+  m.def("cell_keys", &cell_keys, py::arg("cells"));
+  m.def("updated_cell", &updated_cell, py::arg("light"), py::arg("count"), py::arg("sums"), py::arg("samples") = 1);
   m.def("versions", &versions);
   m.def("set_log", &set_log, py::arg("sink"));
   m.def("sobol", &sobol_points, py::arg("count"), py::arg("dimensions"), py::arg("seed"));

@@ -297,6 +297,11 @@ def occupied_cells(scene: Scene, levels: int, points: NDArray[np.float64] = ...,
     seconds_mark, seconds_maps, peak_bytes; index (levels + 1, N): each point's cell's data on each level, -1 where empty."""
 def measure_lookups(cells: int, lookups: int) -> dict[str, float]:
     """Look-ups a second on one thread among so many cells of the HashCache, each of which reads the cell's light: in the table
-    of cells that are made when needed, in the paper's map over occupied cells (data included), and bare random reads of an array
-    of cells. table, map, reads; table_bytes, map_bytes."""
+    of cells that are made when needed, in the paper's map over occupied cells (data included), and bare random reads of the
+    table's memory. table, map, reads; table_bytes, map_bytes."""
+def cell_keys(cells: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """The 64 bits by which the HashCache knows cells, rows of x, y, z, owner, level. Never with a lower half of 0."""
+def updated_cell(light: float, count: int, sums: NDArray[np.float64], samples: int = 1) -> dict[str, Any]:
+    """A cell of the HashCache that holds `count` samples of grey light (0: none), after one update a row of sums (N, 3), each
+    of so many samples: light, count."""
 def sobol(count: int, dimensions: int, seed: int) -> NDArray[np.float32]: ...

@@ -116,6 +116,6 @@ def test_nothing_and_wrong_input() -> None:
 def test_look_ups_are_measured() -> None:
     speeds = _native.measure_lookups(20_000, 50_000)
     assert min(speeds[name] for name in ("table", "map", "reads")) > 1e4
-    assert speeds["table_bytes"] >= 20_000 * 24 - 200 and speeds["map_bytes"] > 20_000 * 24 - 200
+    assert speeds["table_bytes"] >= 20_000 * 20 and speeds["map_bytes"] > 20_000 * 16 - 200
     with pytest.raises(afterglow.InvalidInput, match="cells"):
         _native.measure_lookups(0, 10)

@@ -221,7 +221,7 @@ Answer Cache::blend(const CachePoint& p, const LookUp& look) const {
 Rgb Cache::shown(const Record& record, const CachePoint& p, int level) const {
   switch (settings_.view) {
     case View::kLight:
-      return record.light;
+      return record.light();
     case View::kLevel:
       return scale_color(float(level % 8) / 7.0f);
     case View::kCount:
@@ -231,7 +231,7 @@ Rgb Cache::shown(const Record& record, const CachePoint& p, int level) const {
     case View::kSide:
       return 0.5f + 0.5f * p.face_normal;
   }
-  return record.light;
+  return record.light();
 }
 
 }  // namespace afterglow::hash_cache

@@ -158,7 +158,7 @@ class StoringVisitor {
     Rgb light(0.0f);
     for (int i = 0; i < surface.count; ++i)
       if (surface.lobes[i].kind < LobeKind::kMicrofacetReflection)
-        light += surface.lobes[i].weight * records[surface.lobes[i].kind == LobeKind::kTranslucent]->light;
+        light += surface.lobes[i].weight * records[surface.lobes[i].kind == LobeKind::kTranslucent]->light();
     for (uint32_t i = 0; i < count_; ++i)
       if (Stored& s = stored_[i]; s.live && !s.last) s.light += s.throughput * light;
     return true;

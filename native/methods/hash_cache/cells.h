@@ -41,15 +41,19 @@ inline uint64_t mix(uint64_t x) {
   return x ^ (x >> 31);
 }
 
+/// Both halves of a product of 128 bits depend on all bits of both words (Yi 2019, "wyhash").
+inline uint64_t fold(uint64_t a, uint64_t b) {
+  const unsigned __int128 product = (unsigned __int128)a * b;
+  return uint64_t(product) ^ uint64_t(product >> 64);
+}
+
 /// 64 bits that stand for the whole cell: with 10^8 cells, two of them share a key with a chance of 3e-4 in all.
-/// Never 0, which means an empty slot.
+/// Its lower half is never 0, which means an empty slot.
 inline uint64_t key_of(const Cell& c) {
   const uint64_t place = uint64_t(uint32_t(c.x)) | uint64_t(uint32_t(c.y)) << 32;
-  const uint64_t rest = (uint64_t(uint32_t(c.z)) | uint64_t(c.owner) << 32) + (c.level + 1) * 0x9e3779b97f4a7c15u;
-  // Both halves of a product of 128 bits depend on all bits of both words (Yi 2019, "wyhash").
-  const unsigned __int128 product = (unsigned __int128)(place ^ 0xa0761d6478bd642fu) * (mix(rest) | 1);
-  const uint64_t h = mix(uint64_t(product) ^ uint64_t(product >> 64));
-  return h ? h : 1;
+  const uint64_t rest = (uint64_t(uint32_t(c.z)) | uint64_t(c.owner) << 32) + c.level * 0x9e3779b97f4a7c15u;
+  const uint64_t h = fold(fold(place ^ 0xa0761d6478bd642fu, rest ^ 0xe7037ed1a0b428dbu) ^ place, 0x8ebc6af09c88c6e3u);
+  return uint32_t(h) ? h : h + 1;
 }
 
 /// The grid of one scene. It reaches 2^9 radii beyond the centre it was made for; what is farther shares the outermost

@@ -11,7 +11,7 @@ namespace afterglow::hash_cache {
 namespace {
 
 constexpr char kMagic[16] = "afterglow cells";
-constexpr uint32_t kFormat = 2;
+constexpr uint32_t kFormat = 3;
 
 /// What must be the same for cells to mean the same.
 struct Header {
@@ -32,7 +32,7 @@ Header header_of(const Scene& scene) {
   Header h;
   std::memset(static_cast<void*>(&h), 0, sizeof(h));
   std::memcpy(h.magic, kMagic, sizeof(h.magic));
-  h.format = kFormat, h.record_size = sizeof(Record);
+  h.format = kFormat, h.record_size = sizeof(Entry);
   const Box box = scene.bounds();
   for (int i = 0; i < 3; ++i) h.bounds[i] = box.lower[i], h.bounds[3 + i] = box.upper[i];
   h.instances = scene.instances().size(), h.lights = scene.light_handles().size();
@@ -49,7 +49,7 @@ bool same_scene(const Header& a, const Header& b) {
 }  // namespace
 
 std::vector<char> Cache::save(const CommittedScene& scene) const {
-  const std::vector<Record> records = table_.sorted();
+  const std::vector<Entry> records = table_.sorted();
   if (stale_ || !shown_instances_.empty()) return {};
   Header h = header_of(scene.scene);
   h.records = records.size();
@@ -62,9 +62,9 @@ std::vector<char> Cache::save(const CommittedScene& scene) const {
   h.transparent = l.transparent, h.caustics = uint32_t(l.caustics_reflective) | uint32_t(l.caustics_refractive) << 1;
   h.direct = s.direct;
   h.renders = renders_, h.stamp = stamp_;
-  std::vector<char> bytes(sizeof(h) + records.size() * sizeof(Record));
+  std::vector<char> bytes(sizeof(h) + records.size() * sizeof(Entry));
   std::memcpy(bytes.data(), &h, sizeof(h));
-  if (!records.empty()) std::memcpy(bytes.data() + sizeof(h), records.data(), records.size() * sizeof(Record));
+  if (!records.empty()) std::memcpy(bytes.data() + sizeof(h), records.data(), records.size() * sizeof(Entry));
   return bytes;
 }
 
@@ -73,19 +73,20 @@ void Cache::load(const CommittedScene& scene, std::span<const char> bytes) {
   if (bytes.size() < sizeof(h)) throw InvalidInput("this is no saved HashCache: it is too short");
   std::memcpy(static_cast<void*>(&h), bytes.data(), sizeof(h));
   if (std::memcmp(h.magic, kMagic, sizeof(h.magic))) throw InvalidInput("this is no saved HashCache");
-  if (h.format != kFormat || h.record_size != sizeof(Record))
+  if (h.format != kFormat || h.record_size != sizeof(Entry))
     throw InvalidInput("this HashCache was saved by another version of Afterglow");
-  if (h.records != (bytes.size() - sizeof(h)) / sizeof(Record) || (bytes.size() - sizeof(h)) % sizeof(Record))
+  if (h.records != (bytes.size() - sizeof(h)) / sizeof(Entry) || (bytes.size() - sizeof(h)) % sizeof(Entry))
     throw InvalidInput("this saved HashCache is cut off");
   if (!same_scene(h, header_of(scene.scene)))
     throw InvalidInput("this HashCache was saved from another scene: bounds, objects, triangles or lights differ");
-  std::vector<Record> records(h.records);
+  std::vector<Entry> records(h.records);
   if (!records.empty())
-    std::memcpy(static_cast<void*>(records.data()), bytes.data() + sizeof(h), h.records * sizeof(Record));
+    std::memcpy(static_cast<void*>(records.data()), bytes.data() + sizeof(h), h.records * sizeof(Entry));
   uint64_t before = 0;
-  for (const Record& r : records) {
-    if (r.key <= before || !is_finite(r.light)) throw InvalidInput("this saved HashCache is damaged");
-    before = r.key;
+  for (const Entry& e : records) {
+    const bool whole = e.key > before && e.record.tag && e.record.tag == uint32_t(e.key) && e.record.count();
+    if (!whole || !is_finite(e.record.light())) throw InvalidInput("this saved HashCache is damaged");
+    before = e.key;
   }
   table_.restore(records);
   grid_ = Grid(h.finest, Vec3(h.corner[0], h.corner[1], h.corner[2]));

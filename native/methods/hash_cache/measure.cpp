@@ -47,18 +47,19 @@ LookupSpeeds measure_lookups(uint64_t cells, uint64_t lookups) {
   cells = std::max<uint64_t>(cells / kInBlock, 1) * kInBlock;
   const auto pick = [&](uint64_t random) { return uint64_t((unsigned __int128)random * cells >> 64); };
   {
-    std::vector<Record> records(cells);
+    std::vector<Entry> entries(cells);
     for (uint64_t i = 0; i < cells; ++i) {
-      records[i].key = key_of(cell_of(i));
-      records[i].word = uint32_t(i);
+      entries[i].key = key_of(cell_of(i));
+      entries[i].record.tag = uint32_t(entries[i].key), entries[i].record.word = uint32_t(i);
     }
+    Table table;
+    table.restore(entries);
+    entries = {};
     out.reads = speed(lookups, [&](uint64_t first) {
       uint32_t sum = 0;
-      for (size_t k = 0; k < kGroup; ++k) sum += records[pick(mix(first + k))].word;
+      for (size_t k = 0; k < kGroup; ++k) sum += table.home(mix(first + k)).cells[0].word;
       return sum;
     });
-    Table table;
-    table.restore(records);
     out.table_bytes = table.bytes();
     out.table = speed(lookups, [&](uint64_t first) {
       uint64_t keys[kGroup];
@@ -89,6 +90,22 @@ LookupSpeeds measure_lookups(uint64_t cells, uint64_t lookups) {
     return sum;
   });
   return out;
+}
+
+std::vector<uint64_t> keys_of(std::span<const Cell> cells) {
+  std::vector<uint64_t> keys;
+  for (const Cell& c : cells) keys.push_back(key_of(c));
+  return keys;
+}
+
+Updated updated_cell(const Rgb& light, uint32_t count, std::span<const Rgb> sums, uint32_t samples) {
+  Record r;
+  r.tag = 1;
+  const double mean[3] = {light.x, light.y, light.z};
+  if (count) r.set(mean, std::min(count, Record::kMostSamples), 0, mix(count));
+  uint32_t salt = 0;
+  for (const Rgb& sum : sums) r.add(sum, samples, 0, salt++);
+  return {r.light(), r.count()};
 }
 
 }  // namespace afterglow::hash_cache

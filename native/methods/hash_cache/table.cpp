@@ -12,7 +12,6 @@ namespace {
 
 using KeyIndex = std::pair<uint64_t, uint32_t>;
 constexpr size_t kBlock = 4096;
-constexpr size_t kFullest = 10, kOf = 16;  // slots that may be taken, in sixteenths
 
 /// Keys and indices of the samples, grouped by the keys' first byte and in the samples' order within each group.
 std::vector<KeyIndex> grouped(std::span<const Sample> samples, unsigned threads,
@@ -45,58 +44,72 @@ std::vector<KeyIndex> grouped(std::span<const Sample> samples, unsigned threads,
 
 }  // namespace
 
-void Record::add(const Rgb& sum, uint32_t n, uint32_t stamp) {
-  const uint32_t all = std::min(count() + n, kMostSamples);
-  const float share = float(n) / float(std::max(all, n));
-  light += share * (sum / float(n) - light);
-  light = glm::max(light, Rgb(0.0f));  // rounding may go a hair below
-  word = all << 12 | (stamp & (kStamps - 1));
+Record& Table::slot(uint32_t p, uint64_t key) {
+  const Part& part = parts_[p];
+  for (uint32_t i = part.home(key);; i = part.next(i))
+    for (Record& r : stores_[p].buckets[i].cells)
+      if (r.tag == uint32_t(key) || !r.tag) return r;
 }
 
-Record& Table::Part::slot(uint64_t key) {
-  for (size_t i = home(key);; i = i + 1 == slots.size() ? 0 : i + 1)
-    if (slots[i].key == key || !slots[i].key) return slots[i];
+void Table::put(uint32_t p, const Entry& entry) {
+  Store& store = stores_[p];
+  Record& r = slot(p, entry.key);
+  r = entry.record;
+  store.rest[size_t(&r - store.buckets.front().cells)] = uint32_t(entry.key >> 32);
 }
 
-void Table::Part::resize(size_t count) {
-  std::vector<Record> old(count);
-  old.swap(slots);
-  for (const Record& r : old)
-    if (r.key) slot(r.key) = r;
+template <class Function>
+void Table::each(uint32_t p, const Function& function) const {
+  const Store& store = stores_[p];
+  for (size_t b = 0; b < store.buckets.size(); ++b)
+    for (size_t k = 0; k < 4; ++k)
+      if (const Record& r = store.buckets[b].cells[k]; r.tag)
+        function(Entry{uint64_t(store.rest[4 * b + k]) << 32 | r.tag, r});
 }
 
-void Table::Part::reserve(size_t more, size_t most) {
-  const size_t needed = (used + more) * kOf / kFullest + 2;
-  if (needed > slots.size()) resize(std::max(needed, std::min(most, slots.size() + slots.size() / 2)));
+void Table::resize(uint32_t p, size_t count) {
+  std::vector<Entry> kept;
+  kept.reserve(stores_[p].used);
+  each(p, [&](const Entry& e) { kept.push_back(e); });
+  Store& store = stores_[p];
+  store = Store{std::vector<Bucket>(count), std::vector<uint32_t>(4 * count), kept.size()};
+  parts_[p] = {store.buckets.data(), uint32_t(count)};
+  for (const Entry& e : kept) put(p, e);
 }
 
-void Table::Part::drop_older(uint32_t age, uint32_t stamp) {
-  std::vector<Record> kept;
-  for (const Record& r : slots)
-    if (r.key && ((stamp - r.stamp()) & (Record::kStamps - 1)) <= age) kept.push_back(r);
-  std::fill(slots.begin(), slots.end(), Record{});
-  for (const Record& r : kept) slot(r.key) = r;
-  used = kept.size();
+void Table::reserve(uint32_t p, size_t more, size_t most) {
+  const size_t count = stores_[p].buckets.size(), needed = (stores_[p].used + more) * kOf / kFullest + 1;
+  if (needed > count) resize(p, std::max(needed, std::min(most, count + count / 2)));
+}
+
+void Table::keep_younger(uint32_t p, uint32_t age, uint32_t stamp) {
+  std::vector<Entry> kept;
+  each(p, [&](const Entry& e) {
+    if (((stamp - e.record.stamp()) & (Record::kStamps - 1)) <= age) kept.push_back(e);
+  });
+  Store& store = stores_[p];
+  std::fill(store.buckets.begin(), store.buckets.end(), Bucket{});
+  for (const Entry& e : kept) put(p, e);
+  store.used = kept.size();
 }
 
 /// When the new cells do not fit: the longest without a sample go, until a quarter of the part is free.
-void Table::make_room(Part& part, size_t fresh, uint32_t stamp, TableCounts& counts) const {
-  const size_t most = part_limit() * kFullest / kOf;
-  if (part.used + fresh <= most) return;
+void Table::make_room(uint32_t p, size_t fresh, uint32_t stamp, TableCounts& counts) {
+  const size_t most = most_cells(), used = stores_[p].used;
+  if (used + fresh <= most) return;
   std::vector<uint32_t> with_age(Record::kStamps, 0);
-  for (const Record& r : part.slots)
-    if (r.key) with_age[(stamp - r.stamp()) & (Record::kStamps - 1)]++;
+  each(p, [&](const Entry& e) { with_age[(stamp - e.record.stamp()) & (Record::kStamps - 1)]++; });
   const size_t wanted = most - std::min(most, std::max(fresh, most / 4));
   size_t kept = with_age[0];
   uint32_t age = 0;
   while (age + 1 < Record::kStamps && kept + with_age[age + 1] <= wanted) kept += with_age[++age];
-  if (kept == part.used) return;
-  counts.evicted += part.used - kept;
-  part.drop_older(age, stamp);
+  if (kept == used) return;
+  counts.evicted += used - kept;
+  keep_younger(p, age, stamp);
 }
 
-void Table::reduce(std::span<const Sample> samples, std::span<const KeyIndex> order, uint32_t stamp, Part& part,
-                   Reduced& out) const {
+void Table::reduce(std::span<const Sample> samples, std::span<const KeyIndex> order, uint32_t stamp, uint32_t salt,
+                   uint32_t p, Reduced& out) {
   std::vector<KeyIndex> sorted(order.begin(), order.end());
   std::sort(sorted.begin(), sorted.end());
   std::vector<uint64_t> keys;
@@ -111,27 +124,25 @@ void Table::reduce(std::span<const Sample> samples, std::span<const KeyIndex> or
     }
     out.cells.push_back(sum);
     keys.push_back(key);
-    fresh += part.slots.empty() || !part.slot(key).key;
+    fresh += !find(key);
   }
-  make_room(part, fresh, stamp, out.counts);
-  const size_t most = part_limit() * kFullest / kOf;
-  part.reserve(std::min(fresh, most - std::min(most, part.used)), part_limit());
-  if (part.slots.empty()) {
-    out.counts.refused += keys.size();
-    return;
-  }
+  make_room(p, fresh, stamp, out.counts);
+  Store& store = stores_[p];
+  const size_t most = most_cells();
+  reserve(p, std::min(fresh, most - std::min(most, store.used)), most_buckets());
   for (size_t i = 0; i < keys.size(); ++i) {
-    Record& record = part.slot(keys[i]);
-    if (!record.key) {
-      if (part.used >= most) {
+    Record& record = slot(p, keys[i]);
+    if (!record.tag) {
+      if (store.used >= most) {
         out.counts.refused++;
         continue;
       }
-      record.key = keys[i];
-      part.used++;
+      record.tag = uint32_t(keys[i]);
+      store.rest[size_t(&record - store.buckets.front().cells)] = uint32_t(keys[i] >> 32);
+      store.used++;
       out.counts.added++;
     }
-    record.add(out.cells[i].light, out.cells[i].count, stamp);
+    record.add(out.cells[i].light, out.cells[i].count, stamp, salt);
   }
 }
 
@@ -141,6 +152,9 @@ uint64_t Table::add(std::vector<Sample> samples, uint32_t stamp, unsigned thread
   for (const Sample& s : samples) begins[std::min<uint32_t>(s.cell.level, kTopLevel)].push_back(s);
   samples.clear();
   uint64_t touched = 0;
+  adds_ = stamp == last_stamp_ ? adds_ + 1 : 0;
+  last_stamp_ = stamp;
+  const uint32_t salt = stamp * 0x9e3779b9u + adds_;
   for (int level = 0; level <= kTopLevel && !stop.stop(); ++level) {
     samples.insert(samples.end(), begins[level].begin(), begins[level].end());
     if (samples.empty()) continue;
@@ -150,7 +164,8 @@ uint64_t Table::add(std::vector<Sample> samples, uint32_t stamp, unsigned thread
     parallel_blocks(kParts, 8, threads, [&](size_t begin, size_t end) {
       for (size_t p = begin; p < end; ++p)
         if (first[p] < first[p + 1])
-          reduce(samples, std::span(order).subspan(first[p], first[p + 1] - first[p]), stamp, parts_[p], reduced[p]);
+          reduce(samples, std::span(order).subspan(first[p], first[p + 1] - first[p]), stamp, salt, uint32_t(p),
+                 reduced[p]);
     });
     samples.clear();
     for (const Reduced& r : reduced) {
@@ -166,50 +181,51 @@ uint64_t Table::add(std::vector<Sample> samples, uint32_t stamp, unsigned thread
 }
 
 void Table::clear() {
-  for (Part& part : parts_) part = Part{};
+  parts_.fill({});
+  stores_.fill({});
   counts_ = TableCounts{};
+  last_stamp_ = adds_ = 0;
 }
 
 void Table::forget(uint32_t most) {
-  for (Part& part : parts_)
-    for (Record& r : part.slots) r.word = std::min(r.count(), most) << 12 | r.stamp();
+  for (Store& store : stores_)
+    for (Bucket& bucket : store.buckets)
+      for (Record& r : bucket.cells) r.set_count(std::min(r.count(), most));
 }
 
 size_t Table::size() const {
   size_t sum = 0;
-  for (const Part& part : parts_) sum += part.used;
+  for (const Store& store : stores_) sum += store.used;
   return sum;
 }
 
 size_t Table::bytes() const {
   size_t sum = sizeof(*this);
-  for (const Part& part : parts_) sum += part.slots.capacity() * sizeof(Record);
+  for (const Store& store : stores_)
+    sum += store.buckets.capacity() * sizeof(Bucket) + store.rest.capacity() * sizeof(uint32_t);
   return sum;
 }
 
-std::vector<Record> Table::sorted() const {
-  std::vector<Record> all;
+std::vector<Entry> Table::sorted() const {
+  std::vector<Entry> all;
   all.reserve(size());
-  for (const Part& part : parts_) {
-    const size_t begin = all.size();
-    for (const Record& r : part.slots)
-      if (r.key) all.push_back(r);
-    std::sort(all.begin() + ptrdiff_t(begin), all.end(),
-              [](const Record& a, const Record& b) { return a.key < b.key; });
+  for (uint32_t p = 0; p < kParts; ++p) {
+    const auto begin = ptrdiff_t(all.size());
+    each(p, [&](const Entry& e) { all.push_back(e); });
+    std::sort(all.begin() + begin, all.end(), [](const Entry& a, const Entry& b) { return a.key < b.key; });
   }
   return all;
 }
 
-void Table::restore(std::span<const Record> records) {
+void Table::restore(std::span<const Entry> entries) {
   clear();
   std::array<size_t, kParts> counts{};
-  for (const Record& r : records) counts[r.key >> 56]++;
+  for (const Entry& e : entries) counts[e.key >> 56]++;
   for (uint32_t p = 0; p < kParts; ++p)
-    if (counts[p]) parts_[p].reserve(counts[p], counts[p]);
-  for (const Record& r : records) {
-    Part& part = parts_[r.key >> 56];
-    part.slot(r.key) = r;
-    part.used++;
+    if (counts[p]) reserve(p, counts[p], 0);
+  for (const Entry& e : entries) {
+    put(uint32_t(e.key >> 56), e);
+    stores_[e.key >> 56].used++;
   }
 }
 
