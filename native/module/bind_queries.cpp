@@ -10,8 +10,6 @@
 #include "base/parallel.h"
 #include "base/sampler.h"
 #include "lights/camera.h"
-#include "methods/hash_cache/measure.h"
-#include "methods/hash_cache/occupied.h"
 #include "module/queries.h"
 #include "rays/measure_rays.h"
 #include "rays/surface_point.h"
@@ -308,76 +306,6 @@ py::array_t<float> sobol_points(py::ssize_t count, py::ssize_t dimensions, uint3
   return out;
 }
 
-/// The structure of the HashCache's paper over a scene, and which of the points lie in occupied cells.
-py::dict occupied_cells(const PyScene& self, int levels, const py::handle& points, unsigned threads) {
-  if (levels < 0 || levels > hash_cache::Occupied::kFinest)
-    throw InvalidInput("occupied_cells: levels must be from 0 to " + std::to_string(hash_cache::Occupied::kFinest));
-  const Points at = numbers<double>(points, "points", 3);
-  const auto n = py::ssize_t(at.shape(0));
-  py::array_t<int64_t> index({py::ssize_t(levels) + 1, n});
-  int64_t* to = index.mutable_data();
-  hash_cache::Occupied occupied;
-  {
-    const py::gil_scoped_release free;
-    const auto lock = reading(self);
-    const Scene& scene = self.core->scene;
-    occupied.build(scene, levels, threads);
-    for (int level = 0; level <= levels; ++level)
-      for (py::ssize_t i = 0; i < n; ++i) {
-        const uint32_t found = occupied.index(relative(at.data() + 3 * i, scene.origin()), level);
-        *to++ = found == kNone ? -1 : int64_t(found);
-      }
-  }
-  py::list cells, blocks, map_bytes;
-  for (const hash_cache::OccupiedLevel& level : occupied.levels()) {
-    cells.append(level.cells());
-    blocks.append(level.blocks());
-    map_bytes.append(level.bytes());
-  }
-  py::dict out;
-  out["cells"] = cells, out["blocks"] = blocks, out["map_bytes"] = map_bytes, out["index"] = index;
-  out["peak_bytes"] = occupied.peak_bytes();
-  out["seconds_mark"] = occupied.seconds_mark(), out["seconds_maps"] = occupied.seconds_maps();
-  return out;
-}
-
-py::dict measure_lookups(uint64_t cells, uint64_t lookups) {
-  if (cells < 1 || cells > (uint64_t(1) << 28)) throw InvalidInput("measure_lookups: cells must be from 1 to 2^28");
-  hash_cache::LookupSpeeds speeds;
-  {
-    const py::gil_scoped_release free;
-    speeds = hash_cache::measure_lookups(cells, lookups);
-  }
-  py::dict out;
-  out["table"] = speeds.table, out["map"] = speeds.map, out["reads"] = speeds.reads;
-  out["table_bytes"] = speeds.table_bytes, out["map_bytes"] = speeds.map_bytes;
-  return out;
-}
-
-py::array_t<uint64_t> cell_keys(const py::array_t<int64_t, py::array::c_style | py::array::forcecast>& cells) {
-  if (cells.ndim() != 2 || cells.shape(1) != 5) throw InvalidInput("cell_keys: cells must be an array (N, 5)");
-  std::vector<hash_cache::Cell> of;
-  for (py::ssize_t i = 0; i < cells.shape(0); ++i) {
-    const int64_t* c = cells.data(i, 0);
-    of.push_back({int32_t(c[0]), int32_t(c[1]), int32_t(c[2]), uint32_t(c[3]), uint32_t(c[4])});
-  }
-  const std::vector<uint64_t> keys = hash_cache::keys_of(of);
-  return py::array_t<uint64_t>(py::ssize_t(keys.size()), keys.data());
-}
-
-py::dict updated_cell(float light, uint32_t count, const py::handle& sums, uint32_t samples) {
-  const Points given = numbers<double>(sums, "sums", 3);
-  if (!samples) throw InvalidInput("updated_cell: samples must be 1 or more");
-  std::vector<Rgb> all;
-  for (py::ssize_t i = 0; i < given.shape(0); ++i)
-    all.emplace_back(float(given.at(i, 0)), float(given.at(i, 1)), float(given.at(i, 2)));
-  const hash_cache::Updated found = hash_cache::updated_cell(Rgb(light), count, all, samples);
-  py::dict out;
-  out["light"] = py::make_tuple(found.light.x, found.light.y, found.light.z);
-  out["count"] = found.count;
-  return out;
-}
-
 }  // namespace
 
 void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>& scene) {
@@ -396,11 +324,6 @@ void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>&
       .def_property_readonly("bytes", &bytes);
   m.def("measure_rays", &measure, py::arg("scene"), py::arg("origins"), py::arg("directions"),
         py::arg("kind") = "closest", py::arg("rounds") = 8);
-  m.def("occupied_cells", &occupied_cells, py::arg("scene"), py::arg("levels"), py::arg("points") = py::list(),
-        py::arg("threads") = 0);
-  m.def("measure_lookups", &measure_lookups, py::arg("cells"), py::arg("lookups"));
-  m.def("cell_keys", &cell_keys, py::arg("cells"));
-  m.def("updated_cell", &updated_cell, py::arg("light"), py::arg("count"), py::arg("sums"), py::arg("samples") = 1);
   m.def("versions", &versions);
   m.def("set_log", &set_log, py::arg("sink"));
   m.def("sobol", &sobol_points, py::arg("count"), py::arg("dimensions"), py::arg("seed"));

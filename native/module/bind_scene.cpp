@@ -320,6 +320,7 @@ void bind_scene(py::module_& m) {
   bind_images_and_materials(scene);
   bind_lights_and_view(scene);
   bind_queries(m, scene);
+  bind_cells(m);
 }
 
 }  // namespace afterglow

@@ -292,9 +292,15 @@ def measure_rays(scene: Scene, origins: NDArray[np.float64], directions: NDArray
                  rounds: int = 8) -> dict[str, Any]:
     """Seconds of all rays on one thread, through native/rays (wrapped) and by bare Embree calls (bare), in alternating
     pairs. kind "closest", or "occluded": then directions are targets."""
-def occupied_cells(scene: Scene, levels: int, points: NDArray[np.float64] = ..., threads: int = 0) -> dict[str, Any]:
-    """Cells that hold geometry, on grids of 1 to 2^levels (at most 12) cells each way: cells, blocks and map_bytes a level,
-    seconds_mark, seconds_maps, peak_bytes; index (levels + 1, N): each point's cell's data on each level, -1 where empty."""
+def occupied_cells(scene: Scene, levels: int, points: NDArray[np.float64] = ..., threads: int = 0,
+                   normals: NDArray[np.float64] = ..., light: NDArray[np.float64] = ...) -> dict[str, Any]:
+    """Cells that hold geometry, on grids of 1 to 2^levels (at most 12) cells each way: cells, blocks, map_bytes and data_bytes a
+    level, seconds_mark, seconds_maps, peak_bytes; index (levels + 1, N): each point's cell's data on each level, -1 where empty.
+    Where each point brings light to the side that its normal faces, light (levels + 1, N, 3) is what its cells hold then."""
+def both_sides(normals: NDArray[np.float64], sums: NDArray[np.float64], samples: NDArray[np.int64], frames: NDArray[np.int64],
+               changed: int = 0) -> dict[str, Any]:
+    """A cell of that structure after so many updates, each a sum of samples that come to the side of a normal in a frame, the
+    scene having changed in frame `changed`: front, back, counts of both, normal, frame, bytes."""
 def measure_lookups(cells: int, lookups: int) -> dict[str, float]:
     """Look-ups a second on one thread among so many cells of the HashCache, each of which reads the cell's light: in the table
     of cells that are made when needed, in the paper's map over occupied cells (data included), and bare random reads of the

@@ -30,8 +30,8 @@ bool CuckooMap::insert(Block block, uint32_t& random) {
                           : candidates[1] == from ? candidates[0]
                                                   : candidates[random >> 31];
     const uint32_t slot = random >> 20 & (kSlots - 1);
-    std::swap(values_[size_t(into) * kSlots + slot], block);
-    keys_[into][slot] = values_[size_t(into) * kSlots + slot].key;
+    std::swap(keys_[into][slot], block.key);
+    std::swap(values_[size_t(into) * kSlots + slot], static_cast<BlockCells&>(block));
     from = into;
   }
   return false;
@@ -46,7 +46,7 @@ void CuckooMap::build(std::span<const Block> blocks, double usage) {
   for (bool done = false; !done; usage *= 1.01) {
     const size_t buckets = size_t(std::ceil(usage * double(blocks.size()) / kSlots)) + 1;
     keys_.assign(buckets, none);
-    values_.assign(buckets * kSlots, Block{});
+    values_.assign(buckets * kSlots, BlockCells{});
     seeds_ = {0x9e3779b9u * (2 * attempts_ + 1), 0x85ebca6bu * (2 * attempts_ + 3)};
     attempts_++;
     uint32_t random = 12345;

@@ -70,7 +70,7 @@ LookupSpeeds measure_lookups(uint64_t cells, uint64_t lookups) {
     });
   }
   std::vector<Block> blocks(cells / kInBlock);
-  for (uint64_t i = 0; i < blocks.size(); ++i) blocks[i] = {uint32_t(i), 0x3fu, uint32_t(i * kInBlock)};
+  for (uint64_t i = 0; i < blocks.size(); ++i) blocks[i] = {{0x3fu, uint32_t(i * kInBlock)}, uint32_t(i)};
   CuckooMap map;
   map.build(blocks);
   std::vector<Record> data(cells);
@@ -82,7 +82,7 @@ LookupSpeeds measure_lookups(uint64_t cells, uint64_t lookups) {
     for (size_t k = 0; k < kGroup; ++k) map.prefetch(uint32_t((numbers[k] = pick(mix(first + k))) / kInBlock));
     for (size_t k = 0; k < kGroup; ++k) {
       const uint32_t bit = uint32_t(numbers[k] % kInBlock);
-      const Block* block = map.find(uint32_t(numbers[k] / kInBlock));
+      const BlockCells* block = map.find(uint32_t(numbers[k] / kInBlock));
       found[k] = &data[block->first + uint32_t(std::popcount(block->bits & ((1u << bit) - 1u)))];
       __builtin_prefetch(found[k]);
     }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <new>
 
 #include "base/parallel.h"
 
@@ -62,7 +63,7 @@ class Layer {
     std::vector<Block> blocks;
     blocks.reserve(touched_.size());
     for (const uint32_t at : touched_) {
-      blocks.push_back({layer * width_ * width_ + at, bits_[at], 0});
+      blocks.push_back({{bits_[at], 0}, layer * width_ * width_ + at});
       bits_[at] = 0;
     }
     touched_.clear();
@@ -124,7 +125,8 @@ uint32_t halved(uint32_t bits) {
 void Occupied::build(const Scene& scene, int finest, unsigned threads, StopToken stop) {
   const double begun = now();
   finest = std::clamp(finest, 0, kFinest);
-  levels_.assign(size_t(finest) + 1, {});
+  levels_.clear();
+  levels_.resize(size_t(finest) + 1);
   Box bounds = scene.bounds();
   if (bounds.empty()) bounds.extend(Vec3(0.0f));
   edge_ = max_component(bounds.size()) * 1.0001f;
@@ -193,7 +195,7 @@ void Occupied::build(const Scene& scene, int finest, unsigned threads, StopToken
     out.cells_ = cells, out.blocks_ = all.size();
     out.map_.build(all);
     size_t held = out.map_.bytes() + 2 * all.size() * sizeof(Block);
-    for (int l = level + 1; l <= finest; ++l) held += levels_[size_t(l)].bytes();
+    for (int l = level + 1; l <= finest; ++l) held += levels_[size_t(l)].map_bytes();
     peak_bytes_ = std::max(peak_bytes_, held);
     seconds_maps_ += now() - at;
     if (!level) break;
@@ -213,6 +215,21 @@ void Occupied::build(const Scene& scene, int finest, unsigned threads, StopToken
     });
     blocks = std::move(coarse);
   }
+  size_t finished = 0;
+  for (OccupiedLevel& level : levels_) {
+    if (!level.cells_) continue;
+    level.data_.reset(static_cast<BothSidesRecord*>(std::calloc(level.cells_, sizeof(BothSidesRecord))));
+    if (!level.data_) throw std::bad_alloc();
+    finished += level.map_bytes() + level.data_bytes();
+  }
+  peak_bytes_ = std::max(peak_bytes_, finished);
+}
+
+void Occupied::add(const Vec3& position, const Vec3& normal, const Rgb& light, uint32_t frame, uint32_t changed,
+                   uint32_t salt) {
+  for (int level = 0; size_t(level) < levels_.size(); ++level)
+    if (const uint32_t at = index(position, level); at != kNone)
+      levels_[size_t(level)].data(at).add(normal, light, 1, frame, changed, salt);
 }
 
 uint32_t Occupied::index(const Vec3& position, int level) const {

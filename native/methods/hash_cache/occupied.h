@@ -4,9 +4,12 @@
 // of a field of bits for the whole cube, which at 4096³ would take 8 GiB. Coarser levels follow from finer ones.
 #pragma once
 
+#include <cstdlib>
+#include <memory>
 #include <vector>
 
 #include "base/cancel.h"
+#include "methods/hash_cache/both_sides.h"
 #include "methods/hash_cache/cuckoo.h"
 #include "scene/scene.h"
 
@@ -17,10 +20,13 @@ class OccupiedLevel {
  public:
   uint64_t cells() const { return cells_; }
   size_t blocks() const { return blocks_; }
-  size_t bytes() const { return map_.bytes(); }
+  size_t map_bytes() const { return map_.bytes(); }
+  size_t data_bytes() const { return data_ ? cells_ * sizeof(BothSidesRecord) : 0; }
+  BothSidesRecord& data(uint32_t index) { return data_.get()[index]; }
+  const BothSidesRecord& data(uint32_t index) const { return data_.get()[index]; }
   /// Index of the cell's data, or kNone: constant time.
   uint32_t index(uint32_t x, uint32_t y, uint32_t z) const {
-    const Block* block = map_.find(key(x >> 2, y >> 2, z >> 1));
+    const BlockCells* block = map_.find(key(x >> 2, y >> 2, z >> 1));
     const uint32_t bit = (x & 3u) + 4u * (y & 3u) + 16u * (z & 1u);
     if (!block || !(block->bits >> bit & 1u)) return kNone;
     return block->first + uint32_t(std::popcount(block->bits & ((1u << bit) - 1u)));
@@ -33,6 +39,10 @@ class OccupiedLevel {
   uint64_t cells_ = 0;
   size_t blocks_ = 0;
   CuckooMap map_;
+  struct Free {
+    void operator()(void* memory) const { std::free(memory); }
+  };
+  std::unique_ptr<BothSidesRecord[], Free> data_;  // zero pages of the system until they are used
 };
 
 class Occupied {
@@ -42,8 +52,11 @@ class Occupied {
   void build(const Scene&, int levels, unsigned threads, StopToken stop = {});
   const std::vector<OccupiedLevel>& levels() const { return levels_; }
   uint32_t index(const Vec3& position, int level) const;
+  /// A sample of light arrives at a surface: in its cell of every level.
+  void add(const Vec3& position, const Vec3& normal, const Rgb& light, uint32_t frame, uint32_t changed, uint32_t salt);
   double seconds_mark() const { return seconds_mark_; }
   double seconds_maps() const { return seconds_maps_; }
+  /// Most memory while building, with what had been finished then.
   size_t peak_bytes() const { return peak_bytes_; }
 
  private:
