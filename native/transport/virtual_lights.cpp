@@ -15,7 +15,7 @@ namespace {
 
 constexpr uint32_t kStartDimensions = 8, kBounceDimensions = 8;
 constexpr uint32_t kBeginnings = 4, kFarBeginnings = 24;  // of a path, one of which is gone on with
-constexpr uint32_t kWays = 8;                             // from a surface that such a path met, one of which it goes
+constexpr uint32_t kWays = 8;                             // from a surface that a path met, one of which it goes
 constexpr float kWhole = 0.25f;    // of the rays from far away go anywhere, the others where light matters
 constexpr int kMostPassages = 64;  // mirrors, glass and transparent surfaces between two diffuse ones
 
@@ -31,6 +31,12 @@ Shares take_diffuse(Surface& surface) {
   for (int i = 0; i < diffuse.count; ++i)
     (diffuse.lobes[i].kind == LobeKind::kTranslucent ? shares.back : shares.front) += diffuse.lobes[i].weight;
   return shares;
+}
+
+/// Of so many paths, those that fill a bounce. Bright rooms reflect about as much: lights of late bounces are then not
+/// much stronger than those of early ones, each of which would be seen as a spot.
+uint32_t going_on(uint32_t paths, uint32_t bounce) {
+  return std::max(uint32_t(double(paths) * std::pow(0.6, double(bounce))), 1u);
 }
 
 float brightness(const Rgb& c) { return (c.x + c.y + c.z) / 3.0f; }
@@ -54,38 +60,30 @@ class LightPath {
     uint32_t alive = 0;
     VirtualLight first;
     LightPath chosen = *this;
-    bool goes_on = false;
     PathPoint chosen_point;
     for (uint32_t candidate = 0; candidate < beginnings(importance_); ++candidate) {
       // Few beginnings go on with one sequence, many take one each: of a path's own none is like another then.
       const PathPoint point = importance_ ? PathPoint{candidate ? hash(seed, candidate) : seed, path}
                                           : PathPoint{seed, path + candidate * plan_.paths[0]};
       VirtualLight light;
-      const bool more = begin(point, light);
+      begin(point, light);
       if (!light.alive) continue;
       const float chance = importance_ ? matters(light) : 1.0f;
       if (chance < 1.0f && unit_float(hash(point.seed, point.index, 0x51du)) >= chance) continue;
       if (alive++ > 0) continue;
       light.front /= chance, light.back /= chance;
       vertex_.throughput /= chance;
-      first = light, goes_on = more, chosen_point = point;
+      first = light, chosen_point = point;
       chosen.take(*this);
     }
     if (!alive) return 0;
     out[plan_.first[0] + path] = first;
     take(chosen);
-    Sampler sampler(chosen_point.seed, chosen_point.index);
     for (uint32_t bounce = 1; bounce < plan_.paths.size() && path < plan_.paths[bounce]; ++bounce) {
       VirtualLight& light = out[plan_.first[bounce] + path];
       const uint32_t dimension = kStartDimensions + kBounceDimensions * bounce;
       const float share = 1.0f / float(plan_.paths[bounce]);
-      if (importance_) {
-        if (!choose_way(chosen_point, dimension, share, light)) break;
-        continue;
-      }
-      if (!goes_on) break;
-      sampler.set_dimension(dimension);
-      goes_on = next_light(sampler, share, light);
+      if (!choose_way(chosen_point, dimension, share, light)) break;
     }
     return alive;
   }
@@ -163,8 +161,8 @@ class LightPath {
     return is_black(light.back) ? front : std::max(front, importance_->at(light.position, -light.normal));
   }
 
-  /// From the last surface on: of several ways one, by how much light matters where they end, with the strength of the
-  /// mean of all (Talbot 2005, resampled importance sampling). Under the sky most ways end nowhere. False: all did.
+  /// From the last surface on: of several ways one, with the strength of the mean of all; by how much light matters
+  /// where they end (Talbot 2005, resampled importance sampling), or the first that meets a surface. False: none does.
   bool choose_way(const PathPoint& at, uint32_t dimension, float share, VirtualLight& light) {
     const LightPath here = *this;
     float weights = 0.0f, chosen_weight = 0.0f;
@@ -181,9 +179,9 @@ class LightPath {
       if (!scatter(vertex_.surface, vertex_.shares, vertex_.point, u_lobe, u)) continue;
       next_light(sampler, share, found);
       if (!found.alive) continue;
-      const float weight = matters(found);
+      const float weight = importance_ ? matters(found) : 1.0f;
       weights += weight;
-      if (u_choice * weights >= weight) continue;
+      if (importance_ ? u_choice * weights >= weight : weights > weight) continue;
       chosen.take(*this), chosen_weight = weight, light = found;
     }
     if (!(weights > 0.0f)) return false;
@@ -198,7 +196,7 @@ class LightPath {
   void take(const LightPath& other) {
     from_ = other.from_, ray_ = other.ray_, context_ = other.context_;
     throughput_ = other.throughput_, first_ = other.first_, guided_ = other.guided_;
-    if (importance_) vertex_ = other.vertex_;
+    vertex_ = other.vertex_;
   }
 
   /// Goes on to the next surface with a diffuse lobe and leaves a light there. False: the path ended.
@@ -228,17 +226,14 @@ class LightPath {
       }
       if (!weigh(point.position)) return false;
       const Shares shares = take_diffuse(surface);
-      const bool has_diffuse = !is_black(shares.front) || !is_black(shares.back) || surface.count == 0;
+      const bool has_diffuse = !is_black(shares.front) || !is_black(shares.back);
       if (!has_diffuse) {
         if (reached || !bounce_on(surface, point, std::fmod(u_lobe + turned, 1.0f), u)) return false;
         continue;
       }
       leave_light(point, shares, share, light);
-      if (importance_) {  // its ways are chosen later
-        vertex_ = {surface, shares, point, throughput_, context_};
-        return true;
-      }
-      return scatter(surface, shares, point, u_lobe, u);
+      vertex_ = {surface, shares, point, throughput_, context_};  // its ways are chosen later
+      return true;
     }
     return false;
   }
@@ -374,7 +369,7 @@ SlotPlan plan_slots(uint32_t count, uint32_t bounces) {
   if (!count || !bounces) return plan;
   const auto slots_of = [&](uint32_t paths) {
     uint64_t sum = 0;
-    for (uint32_t b = 0; b < bounces; ++b) sum += std::max(paths >> std::min(b, 31u), 1u);
+    for (uint32_t b = 0; b < bounces; ++b) sum += going_on(paths, b);
     return sum;
   };
   uint32_t low = 1, high = count;  // the most paths whose slots fit
@@ -386,7 +381,7 @@ SlotPlan plan_slots(uint32_t count, uint32_t bounces) {
       high = middle - 1;
   }
   for (uint32_t b = 0; b < bounces && plan.slots < count; ++b) {
-    const uint32_t paths = std::max(low >> std::min(b, 31u), 1u);
+    const uint32_t paths = going_on(low, b);
     plan.first.push_back(plan.slots), plan.paths.push_back(paths);
     plan.slots += paths;
   }

@@ -40,7 +40,7 @@ struct SlotPlan {
   std::vector<uint32_t> first, paths;
   uint32_t slots = 0;
 };
-/// Half of the paths go on after each bounce; at least one.
+/// Three of five paths go on after each bounce; at least one.
 SlotPlan plan_slots(uint32_t count, uint32_t bounces);
 
 /// All slots, in order of bounce, then path.

@@ -13,7 +13,7 @@ namespace afterglow::instant_cache {
 namespace {
 
 constexpr char kMagic[16] = "afterglow icach";
-constexpr uint32_t kFormat = 2;
+constexpr uint32_t kFormat = 3;
 
 /// FNV-1a over the bytes of plain values.
 class Fingerprint {
