@@ -23,7 +23,7 @@ constexpr float kLuminance = 3.0f;    // s_l, as the paper has it
 
 constexpr float kMostLength = 1e30f;
 constexpr float kTiny = 1e-35f;  // keeps 0 / 0 from being asked
-constexpr int kRun = 64;         // pixels of a row at a time
+constexpr size_t kMargin = 16;   // before and behind: eight are read at once, up to eight beside a row's end
 
 /// How far luminances may differ. Faster than the error itself, so that the filter is gone when it would blur more than
 /// it smooths.
@@ -80,14 +80,9 @@ float luminance_stop(const Rgb& a, const Rgb& b, float error) {
   return luminance_weight(luminance(a), luminance(b), error);
 }
 
-/// Sums over the taps of a run of pixels.
-struct LayeredFilter::Sums {
-  float red[kRun + kLanes], green[kRun + kLanes], blue[kRun + kLanes], weight[kRun + kLanes];
-};
-
 void LayeredFilter::begin(uint32_t width, uint32_t height) {
   width_ = width, height_ = height;
-  const size_t pixels = size_t(width) * height + kLanes;  // eight are read at once, the last ones, too
+  const size_t pixels = size_t(width) * height + 2 * kMargin;
   for (auto* plane : {&x_, &y_, &z_, &nx_, &ny_, &nz_, &footprint_, &segment_, &spread_, &red_, &green_, &blue_,
                       &luminance_, &next_[0], &next_[1], &next_[2], &next_known_})
     if (plane->size() < pixels) plane->resize(pixels);  // what no surface has set is never used but times 0
@@ -95,7 +90,12 @@ void LayeredFilter::begin(uint32_t width, uint32_t height) {
   todo_.assign(pixels, 0);
 }
 
+Rgb LayeredFilter::light(size_t pixel) const {
+  return {red_[pixel + kMargin], green_[pixel + kMargin], blue_[pixel + kMargin]};
+}
+
 void LayeredFilter::set(size_t pixel, const LayerPixel& p) {
+  pixel += kMargin;
   x_[pixel] = p.position.x, y_[pixel] = p.position.y, z_[pixel] = p.position.z;
   nx_[pixel] = p.normal.x, ny_[pixel] = p.normal.y, nz_[pixel] = p.normal.z;
   footprint_[pixel] = p.footprint, segment_[pixel] = std::min(p.segment, kMostLength),
@@ -106,73 +106,51 @@ void LayeredFilter::set(size_t pixel, const LayerPixel& p) {
   todo_[pixel] = p.hole || p.error > kExact;
 }
 
-/// Adds what `count` pixels from p on get from those from q on.
-void LayeredFilter::tap(size_t p, size_t q, size_t count, float kernel, float reach, float step, Sums& sums) const {
-  const float sharpness = 1.0f / step;
-  for (size_t i = 0; i < count; i += kLanes) {
-    const size_t a = p + i, b = q + i;
-    const Floats here = kIndices < float(count - i) ? load(&known_[b]) : Floats{};
-    const Floats nax = load(&nx_[a]), nay = load(&ny_[a]), naz = load(&nz_[a]);
-    const Floats nbx = load(&nx_[b]), nby = load(&ny_[b]), nbz = load(&nz_[b]);
-    const Floats x = load(&x_[b]) - load(&x_[a]), y = load(&y_[b]) - load(&y_[a]), z = load(&z_[b]) - load(&z_[a]);
-    const Floats off_a = x * nax + y * nay + z * naz, off_b = x * nbx + y * nby + z * nbz;
-    const Floats stop = normal_weight(nax * nbx + nay * nby + naz * nbz) *
-                        plane_weight(most(most(off_a, -off_a), most(off_b, -off_b)), load(&footprint_[a]),
-                                     load(&footprint_[b]), reach) *
-                        segment_weight(load(&segment_[a]), load(&segment_[b]));
-    const Floats light = luminance_weight(load(&luminance_[a]), load(&luminance_[b]),
-                                          most(load(&spread_[a]), load(&spread_[b])) * sharpness);
-    const Floats w = here * (kernel * stop) * (load(&known_[a]) != 0.0f ? light : Floats{} + 1.0f);
-    const auto add = [&](float* to, Floats value) {
-      const Floats sum = load(to + i) + value;
-      std::memcpy(to + i, &sum, sizeof sum);
-    };
-    add(sums.weight, w);
-    add(sums.red, w * load(&red_[b])), add(sums.green, w * load(&green_[b])), add(sums.blue, w * load(&blue_[b]));
-  }
-}
-
-void LayeredFilter::row(int y, int step) {
+/// Eight pixels of a row, from column x on: all that they are asked for is loaded once, and sums stay in registers.
+void LayeredFilter::block(int x, int y, int step) {
   const int width = int(width_), height = int(height_);
-  for (int begin = 0; begin < width; begin += kRun) {
-    const int end = std::min(width, begin + kRun);
-    const size_t first = size_t(y) * width_ + size_t(begin);
-    if (!std::memchr(todo_.data() + first, 1, size_t(end - begin))) continue;
-    Sums sums = {};
-    for (int i = 0; i < end - begin; ++i) {
-      const size_t p = first + size_t(i);
-      const float w = known_[p] * kKernel[0] * kKernel[0];
-      sums.weight[i] = w;
-      sums.red[i] = w * red_[p], sums.green[i] = w * green_[p], sums.blue[i] = w * blue_[p];
+  const size_t p = kMargin + size_t(y) * width_ + size_t(x);
+  const Floats columns = kIndices + float(x);
+  const Floats ax = load(&x_[p]), ay = load(&y_[p]), az = load(&z_[p]);
+  const Floats nax = load(&nx_[p]), nay = load(&ny_[p]), naz = load(&nz_[p]);
+  const Floats footprint = load(&footprint_[p]), segment = load(&segment_[p]);
+  const Floats luminances = load(&luminance_[p]), spread = load(&spread_[p]), known = load(&known_[p]);
+  Floats weight = known * (kKernel[0] * kKernel[0]);
+  Floats red = weight * load(&red_[p]), green = weight * load(&green_[p]), blue = weight * load(&blue_[p]);
+  const float sharpness = 1.0f / float(step);
+  for (int dy = -2; dy <= 2; ++dy) {
+    if (y + dy * step < 0 || y + dy * step >= height) continue;
+    for (int dx = -2; dx <= 2; ++dx) {
+      const int left = x + dx * step;
+      if ((!dx && !dy) || left + kLanes <= 0 || left >= width) continue;
+      const size_t q = size_t(ptrdiff_t(p) + ptrdiff_t(dy * step) * width + dx * step);
+      uint64_t any[4];  // known pixels are rare in the layers behind mirrors
+      std::memcpy(any, &known_[q], sizeof any);
+      if (!(any[0] | any[1] | any[2] | any[3])) continue;
+      const Floats column = columns + float(dx * step);
+      const Floats here = column >= 0.0f && column < float(width) ? load(&known_[q]) : Floats{};
+      const Floats nbx = load(&nx_[q]), nby = load(&ny_[q]), nbz = load(&nz_[q]);
+      const Floats wx = load(&x_[q]) - ax, wy = load(&y_[q]) - ay, wz = load(&z_[q]) - az;
+      const Floats off_a = wx * nax + wy * nay + wz * naz, off_b = wx * nbx + wy * nby + wz * nbz;
+      const float reach = float(step * std::max(std::abs(dx), std::abs(dy)));
+      const Floats stop =
+          normal_weight(nax * nbx + nay * nby + naz * nbz) *
+          plane_weight(most(most(off_a, -off_a), most(off_b, -off_b)), footprint, load(&footprint_[q]), reach) *
+          segment_weight(segment, load(&segment_[q]));
+      const Floats light =
+          luminance_weight(luminances, load(&luminance_[q]), most(spread, load(&spread_[q])) * sharpness);
+      const float kernel = kKernel[std::abs(dx)] * kKernel[std::abs(dy)];
+      const Floats w = here * (kernel * stop) * (known != 0.0f ? light : Floats{} + 1.0f);
+      weight += w;
+      red += w * load(&red_[q]), green += w * load(&green_[q]), blue += w * load(&blue_[q]);
     }
-    for (int dy = -2; dy <= 2; ++dy) {
-      const int j = y + dy * step;
-      if (j < 0 || j >= height) continue;
-      for (int dx = -2; dx <= 2; ++dx) {
-        if (!dx && !dy) continue;
-        const int from = std::max(begin, -dx * step), to = std::min(end, width - dx * step);
-        if (from >= to) continue;
-        const bool whole = from == begin;
-        Sums part;  // begins at `from`
-        if (!whole) part = Sums{};
-        Sums& into = whole ? sums : part;
-        tap(size_t(y) * width_ + size_t(from), size_t(j) * width_ + size_t(from + dx * step), size_t(to - from),
-            kKernel[std::abs(dx)] * kKernel[std::abs(dy)], float(step * std::max(std::abs(dx), std::abs(dy))),
-            float(step), into);
-        if (whole) continue;
-        for (int i = 0; i < to - from; ++i) {
-          sums.weight[i + from - begin] += part.weight[i], sums.red[i + from - begin] += part.red[i];
-          sums.green[i + from - begin] += part.green[i], sums.blue[i + from - begin] += part.blue[i];
-        }
-      }
-    }
-    for (int i = 0; i < end - begin; ++i) {
-      const size_t p = first + size_t(i);
-      if (!todo_[p] || !(sums.weight[i] > 0.0f)) continue;
-      const float scale = 1.0f / sums.weight[i];
-      next_[0][p] = sums.red[i] * scale, next_[1][p] = sums.green[i] * scale, next_[2][p] = sums.blue[i] * scale;
-      next_known_[p] = 1.0f;
-    }
+  }
+  for (int i = 0; i < std::min(kLanes, width - x); ++i) {
+    if (!todo_[p + size_t(i)] || !(weight[i] > 0.0f)) continue;
+    const float scale = 1.0f / weight[i];
+    next_[0][p + size_t(i)] = red[i] * scale, next_[1][p + size_t(i)] = green[i] * scale;
+    next_[2][p + size_t(i)] = blue[i] * scale;
+    next_known_[p + size_t(i)] = 1.0f;
   }
 }
 
@@ -182,21 +160,23 @@ void LayeredFilter::run(unsigned threads, StopToken stop) {
         height_, 8, threads,
         [&](size_t begin, size_t end) {
           for (size_t y = begin; y < end; ++y)
-            if (std::memchr(todo_.data() + y * width_, 1, width_)) what(int(y));
+            if (std::memchr(todo_.data() + kMargin + y * width_, 1, width_)) what(int(y));
         },
         stop);
   };
   for (int pass = 0; pass < kPasses && !stop.stop(); ++pass) {
     rows([&](int y) {
-      std::fill_n(next_known_.begin() + ptrdiff_t(size_t(y) * width_), width_, 0.0f);
-      row(y, 1 << pass);
+      const size_t first = kMargin + size_t(y) * width_;
+      std::fill_n(next_known_.begin() + ptrdiff_t(first), width_, 0.0f);
+      for (size_t x = 0; x < width_; x += kLanes)
+        if (std::memchr(todo_.data() + first + x, 1, std::min<size_t>(kLanes, width_ - x))) block(int(x), y, 1 << pass);
     });
     if (stop.stop()) return;
     rows([&](int y) {
-      for (size_t p = size_t(y) * width_, end = p + width_; p < end; ++p)
+      for (size_t p = kMargin + size_t(y) * width_, end = p + width_; p < end; ++p)
         if (todo_[p] && next_known_[p] != 0.0f) {
           red_[p] = next_[0][p], green_[p] = next_[1][p], blue_[p] = next_[2][p];
-          luminance_[p] = luminance(light(p));
+          luminance_[p] = luminance({red_[p], green_[p], blue_[p]});
           known_[p] = 1.0f;
         }
     });

@@ -37,12 +37,10 @@ class LayeredFilter {
   /// Pixels may be set from several threads, each once.
   void set(size_t pixel, const LayerPixel&);
   void run(unsigned threads = 0, StopToken stop = {});
-  Rgb light(size_t pixel) const { return {red_[pixel], green_[pixel], blue_[pixel]}; }
+  Rgb light(size_t pixel) const;
 
  private:
-  struct Sums;
-  void row(int y, int step);
-  void tap(size_t p, size_t q, size_t count, float kernel, float reach, float step, Sums&) const;
+  void block(int x, int y, int step);
 
   uint32_t width_ = 0, height_ = 0;
   std::vector<float> x_, y_, z_, nx_, ny_, nz_, footprint_, segment_, red_, green_, blue_, luminance_;
