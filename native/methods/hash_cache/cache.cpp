@@ -15,7 +15,8 @@ constexpr float kFarthest = 0.04f;  // of the ray's length: how far look-ups may
 constexpr float kEnough = 0.01f;    // share of the light that the levels above need not bring
 
 constexpr uint32_t kEven = 1024;  // samples from which on a cell shows no blotches
-constexpr size_t kGroup = 32;     // questions whose cells are fetched from memory together
+constexpr size_t kFillBlock = 1024;
+constexpr size_t kGroup = 32;  // questions whose cells are fetched from memory together
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -59,14 +60,15 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   pass_ = work.pass;
 }
 
-bool Cache::trace(const WalkScene& walk, std::span<const CachePoint> points, Work& work) {
+bool Cache::trace(const WalkScene& walk, std::span<const CachePoint> points, std::span<const uint32_t> chosen,
+                  Work& work) {
   const double begun = now();
   RayCounts rays;
-  std::vector<Sample> samples = cache_paths(walk, grid_, table_, settings_.caching, points, seed_, work, rays);
+  std::vector<Sample> samples = cache_paths(walk, grid_, table_, settings_.caching, points, chosen, seed_, work, rays);
   const double traced = now();
   counts_.seconds_paths += traced - begun;
   if (work.stop.stop()) return false;
-  counts_.paths += points.size(), counts_.samples += samples.size();
+  counts_.paths += chosen.size(), counts_.samples += samples.size();
   counts_.rays += rays.bounce, counts_.shadow_rays += rays.shadow, counts_.dropped += rays.dropped;
   const bool told = table_.counts().refused || table_.counts().evicted;
   counts_.cells += table_.add(std::move(samples), stamp_, work.threads, work.stop);
@@ -87,10 +89,14 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   walk.limits.transmission += more, walk.limits.transparent += more;
   // Cells that are there already get paths more rarely the more they hold; points without one are asked for holes.
   const float resolution = work.extra ? 0.0f : settings_.resolution;
-  std::vector<float> shares(points.size());
-  std::vector<uint8_t> empty(points.size());
-  parallel_blocks(points.size(), 1024, work.threads, [&](size_t begin, size_t end) {
+  // The first few paths fill cells in which the others end. What is left has no path; its own cell may be empty.
+  enum Kind : uint8_t { kFirst, kSecond, kThird, kEmpty, kKinds, kNone = kKinds };
+  std::vector<uint8_t> kinds(points.size());
+  const size_t blocks = (points.size() + kFillBlock - 1) / kFillBlock;
+  std::vector<std::array<uint32_t, kKinds>> places(blocks);
+  parallel_blocks(points.size(), kFillBlock, work.threads, [&](size_t begin, size_t end) {
     uint64_t keys[kGroup];
+    auto& counts = places[begin / kFillBlock] = {};
     for (size_t at = begin; at < end; at += kGroup) {
       const size_t n = std::min(kGroup, end - at);
       for (size_t k = 0; k < n; ++k) {
@@ -101,31 +107,41 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
       }
       for (size_t k = 0; k < n; ++k) {
         const Record* r = table_.find(keys[k]);
-        shares[at + k] = resolution * share_of_paths(r ? r->count() : 0, settings_.enough);
-        empty[at + k] = !r;
+        const float share = resolution * share_of_paths(r ? r->count() : 0, settings_.enough);
+        const float u = unit_float(hash(hash_of(points[at + k], seed_), points[at + k].sample, 1));
+        Kind kind = r ? kNone : kEmpty;
+        if (u < share) kind = u < 0.03f * share ? kFirst : u < 0.2f * share ? kSecond : kThird;
+        kinds[at + k] = kind;
+        if (kind != kNone) counts[kind]++;
       }
     }
   });
-  std::array<std::vector<CachePoint>, 3> slices;  // the first few fill cells in which the others end
-  std::vector<uint32_t> rest;                     // without a path, and their own cell is empty
-  for (size_t i = 0; i < points.size(); ++i) {
-    const float u = unit_float(hash(hash_of(points[i], seed_), points[i].sample, 1));
-    if (u < shares[i])
-      slices[u < 0.03f * shares[i] ? 0 : u < 0.2f * shares[i] ? 1 : 2].push_back(points[i]);
-    else if (empty[i])
-      rest.push_back(uint32_t(i));
-  }
-  for (const auto& slice : slices)
-    if (!slice.empty() && !trace(walk, slice, work)) return;
+  std::array<uint32_t, kKinds> sizes{};
+  for (auto& counts : places)
+    for (uint32_t kind = 0; kind < kKinds; ++kind) {
+      const uint32_t n = counts[kind];
+      counts[kind] = sizes[kind];
+      sizes[kind] += n;
+    }
+  std::array<std::vector<uint32_t>, kKinds> of;
+  for (uint32_t kind = 0; kind < kKinds; ++kind) of[kind].resize(sizes[kind]);
+  parallel_blocks(points.size(), kFillBlock, work.threads, [&](size_t begin, size_t end) {
+    auto& next = places[begin / kFillBlock];
+    for (size_t i = begin; i < end; ++i)
+      if (kinds[i] != kNone) of[kinds[i]][next[kinds[i]]++] = uint32_t(i);
+  });
+  for (const Kind kind : {kFirst, kSecond, kThird})
+    if (!of[kind].empty() && !trace(walk, points, of[kind], work)) return;
+  const std::vector<uint32_t>& rest = of[kEmpty];
   std::vector<uint8_t> hole(rest.size());
   parallel_blocks(rest.size(), 256, work.threads, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) hole[i] = open(points[rest[i]]);
   });
-  std::vector<CachePoint> holes;
+  std::vector<uint32_t> holes;
   for (size_t i = 0; i < rest.size(); ++i)
-    if (hole[i]) holes.push_back(points[rest[i]]);
+    if (hole[i]) holes.push_back(rest[i]);
   counts_.holes += holes.size();
-  if (!holes.empty()) trace(walk, holes, work);
+  if (!holes.empty()) trace(walk, points, holes, work);
 }
 
 /// At a place beside the point, where there is such a cell of the same object and side, else at the point.

@@ -57,7 +57,7 @@ class Cache {
   const Record* look_up(const CachePoint&, const Vec3& offset, uint32_t owner, int level) const;
   bool open(const CachePoint&) const;
   Rgb shown(const Record&, const CachePoint&, int level) const;
-  bool trace(const WalkScene&, std::span<const CachePoint>, Work&);
+  bool trace(const WalkScene&, std::span<const CachePoint>, std::span<const uint32_t> chosen, Work&);
 
   CacheSettings settings_;
   bool stale_ = true;

@@ -4,6 +4,7 @@
 // and nothing is ever divided by an albedo, because a vertex starts its own product behind itself.
 #include "methods/hash_cache/caching.h"
 
+#include <algorithm>
 #include <mutex>
 
 #include "base/parallel.h"
@@ -220,10 +221,12 @@ Rgb direct_light(const PathInput& in, const CachePoint& p, float u_light, const 
 }
 
 template <uint32_t kFeatures>
-void trace(const PathInput& in, std::span<const CachePoint> points, std::vector<Sample>& out, RayCounts& counts) {
+void trace(const PathInput& in, std::span<const CachePoint> points, std::span<const uint32_t> chosen,
+           std::vector<Sample>& out, RayCounts& counts) {
   const Walker<kFeatures> walker(in.walk, counts);
   StoringVisitor visitor(in);
-  for (const CachePoint& p : points) {
+  for (const uint32_t index : chosen) {
+    const CachePoint& p = points[index];
     Sampler sampler(hash_of(p, in.seed), p.sample);
     const Vec2 u = sampler.next2();
     PathState path;
@@ -275,20 +278,20 @@ bool CachingSettings::operator==(const CachingSettings& o) const {
 }
 
 std::vector<Sample> cache_paths(const WalkScene& walk, const Grid& grid, const Table& table,
-                                const CachingSettings& settings, std::span<const CachePoint> points, uint32_t seed,
-                                const Work& work, RayCounts& counts) {
+                                const CachingSettings& settings, std::span<const CachePoint> points,
+                                std::span<const uint32_t> chosen, uint32_t seed, const Work& work, RayCounts& counts) {
   PathInput in{walk, grid, table, settings, settings.walk.limits, seed};
   if (settings.length) in.limits.max_bounces = std::min(in.limits.max_bounces, settings.length);
   const bool straight = walk.scene.effects.has(kTransparency) || walk.scene.effects.has(kRayVisibility) || walk.shown;
-  std::vector<std::vector<Sample>> blocks((points.size() + kBlock - 1) / kBlock);
+  std::vector<std::vector<Sample>> blocks((chosen.size() + kBlock - 1) / kBlock);
   std::mutex mutex;
   parallel_blocks(
-      points.size(), kBlock, work.threads,
+      chosen.size(), kBlock, work.threads,
       [&](size_t begin, size_t end) {
         if (work.stop.stop()) return;
         RayCounts own;
         (straight ? trace<kFeatureLobes | kFeatureShapes | kFeatureStraight>
-                  : trace<kFeatureLobes | kFeatureShapes>)(in, points.subspan(begin, end - begin),
+                  : trace<kFeatureLobes | kFeatureShapes>)(in, points, chosen.subspan(begin, end - begin),
                                                            blocks[begin / kBlock], own);
         const std::lock_guard lock(mutex);
         counts += own;
@@ -296,7 +299,13 @@ std::vector<Sample> cache_paths(const WalkScene& walk, const Grid& grid, const T
       work.stop);
   std::vector<Sample> samples;
   if (work.stop.stop()) return samples;
-  for (const auto& block : blocks) samples.insert(samples.end(), block.begin(), block.end());
+  std::vector<size_t> first(1, 0);
+  for (const auto& block : blocks) first.push_back(first.back() + block.size());
+  samples.resize(first.back());
+  parallel_blocks(blocks.size(), 64, work.threads, [&](size_t begin, size_t end) {
+    for (size_t b = begin; b < end; ++b)
+      std::copy(blocks[b].begin(), blocks[b].end(), samples.begin() + ptrdiff_t(first[b]));
+  });
   return samples;
 }
 

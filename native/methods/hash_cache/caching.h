@@ -28,10 +28,12 @@ struct CachingSettings {
 /// mean towards the part of a cell that faces other surfaces. They fill larger cells of their own.
 inline constexpr int kFartherLevels = 2;
 
-/// Paths from all points, each a function of its point, of `seed` and of what the table holds: samples in the order of
-/// the points. Most paths end at their second surface, where a cell on the way knows the rest. Nothing, when stopped.
+/// Paths from the chosen points, each a function of its point, of `seed` and of what the table holds: samples in the
+/// order of the choice. Most paths end at their second surface, where a cell on the way knows the rest. Nothing, when
+/// stopped.
 std::vector<Sample> cache_paths(const WalkScene&, const Grid&, const Table&, const CachingSettings&,
-                                std::span<const CachePoint> points, uint32_t seed, const Work&, RayCounts&);
+                                std::span<const CachePoint> points, std::span<const uint32_t> chosen, uint32_t seed,
+                                const Work&, RayCounts&);
 
 /// A number of its own for every question of an image.
 inline uint32_t hash_of(const CachePoint& p, uint32_t seed) {

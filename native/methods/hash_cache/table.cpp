@@ -167,15 +167,22 @@ uint64_t Table::add(std::vector<Sample> samples, uint32_t stamp, unsigned thread
           reduce(samples, std::span(order).subspan(first[p], first[p + 1] - first[p]), stamp, salt, uint32_t(p),
                  reduced[p]);
     });
-    samples.clear();
-    for (const Reduced& r : reduced) {
+    std::array<size_t, kParts + 1> begin_of;
+    begin_of[0] = 0;
+    for (uint32_t p = 0; p < kParts; ++p) {
+      const Reduced& r = reduced[p];
       counts_.added += r.counts.added, counts_.evicted += r.counts.evicted, counts_.refused += r.counts.refused;
-      touched += r.cells.size();
-      for (Sample s : r.cells) {
-        s.cell = parent(s.cell);
-        samples.push_back(s);
-      }
+      begin_of[p + 1] = begin_of[p] + r.cells.size();
     }
+    touched += begin_of[kParts];
+    samples.resize(begin_of[kParts]);
+    parallel_blocks(kParts, 8, threads, [&](size_t begin, size_t end) {
+      for (size_t p = begin; p < end; ++p)
+        for (size_t i = 0; i < reduced[p].cells.size(); ++i) {
+          Sample& s = samples[begin_of[p] + i] = reduced[p].cells[i];
+          s.cell = parent(s.cell);
+        }
+    });
   }
   return touched;
 }
