@@ -102,6 +102,24 @@ def test_cycles_settings_are_taken_over(in_blender: Run) -> None:
     assert found["draft"] == 64
 
 
+def test_a_click_prepares_an_animation(in_blender: Run) -> None:
+    """Method, its own settings, persistent data; a scene's other settings stay."""
+    found = in_blender(
+        """
+        s = bpy.context.scene
+        s.render.engine = 'AFTERGLOW'
+        own = s.afterglow
+        own.max_bounces = 7
+        bpy.ops.afterglow.animation(moves='CAMERA')
+        result(camera=[own.method, own.samples, own.hash_cache.hash_extra, s.render.use_persistent_data, own.max_bounces])
+        bpy.ops.afterglow.animation(moves='OBJECTS')
+        result(objects=[own.method, own.accuracy, own.instant_cache.virtual_lights, own.instant_cache.light_compensation])
+        """
+    )
+    assert found["camera"] == ["HASH_CACHE", 2, 2.5, True, 7]
+    assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 32]
+
+
 def test_an_active_virtual_environment_is_no_obstacle(in_blender: Run, tmp_path: Path) -> None:
     """Debian's Blender takes the first python3 on PATH for its own, and one of a virtual environment has no numpy."""
     subprocess.run(["/usr/bin/python3", "-m", "venv", "--without-pip", str(tmp_path / "venv")], check=True)

@@ -8,9 +8,10 @@ from ..animation import measure as measure_animation
 from ..figure import Context, Figure
 from . import walk
 
+# As the add-on's preset for animations in which the camera moves.
 WALK = Animation(
     "the camera walks", {"op": "walk", "stride": walk.STRIDE},
-    {"method": "HASH_CACHE", "samples": 2, "accuracy": 0.0, "denoise": True},
+    {"method": "HASH_CACHE", "samples": 2, "accuracy": 0.0, "denoise": True, "hash_extra": 2.5},
     rival_samples=16, error=0.005, sooner=10, reference_samples=128, frames=range(1, LAST + 1))
 
 
