@@ -362,8 +362,13 @@ def view_status(statistics: dict[str, Any], progress: dict[str, Any]) -> str:
 
 
 def cache_status(statistics: dict[str, Any]) -> list[str]:
-    """What a method that keeps records did at the last edit, in words."""
+    """What a method that remembers holds, and did at the last edit, in words."""
     values = statistics["values"]
+    if "cells" in values:
+        counts = [f"{int(values['cells']):,} cells", f"{values['cache_bytes'] / 2**20:.0f} MiB"]
+        if values.get("cells_refused"):
+            counts.append("memory full")
+        return [", ".join(counts)]
     if "records" not in values:
         return []
     counts = [f"{int(values['records']):,} records"]

@@ -23,7 +23,7 @@ def test_cells_live_while_the_view_walks_and_switches(in_window: Run, blend_file
         def look(name):
             statistics = viewport().session.statistics()
             values = statistics['values']
-            seen.append({'name': name, 'method': statistics['method'], **{key: values[key] for key in (
+            seen.append({'name': name, 'status': addon().viewport.cache_status(statistics)[0], 'method': statistics['method'], **{key: values[key] for key in (
                 'cache_resets', 'cells', 'cache_paths')}})
             return view_picture().copy()
 
@@ -47,6 +47,7 @@ def test_cells_live_while_the_view_walks_and_switches(in_window: Run, blend_file
     )
     first, walked, returned, back, _ = found["seen"]
     assert first["method"] == "HASH_CACHE"
+    assert first["status"].startswith(f"{int(first['cells']):,} cells, ") and first["status"].endswith("MiB")
     assert [it["cache_resets"] for it in found["seen"]] == [1, 1, 1, 1, 2]
     assert first["cells"] <= walked["cells"] <= returned["cells"] <= back["cells"]
     assert found["returned"] < 0.02 and found["back"] < 0.02 and found["brighter"] > 0.02, found
