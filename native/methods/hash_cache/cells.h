@@ -71,14 +71,14 @@ class Grid {
   Grid(float finest, const Vec3& corner) : finest_(finest), corner_(corner) {}
   float finest() const { return finest_; }
   const Vec3& corner() const { return corner_; }
-  float size(int level) const { return std::ldexp(finest_, level); }
+  float size(int level) const { return finest_ * float(1u << level); }
   /// The level, with its fraction, whose cells have this size.
   float level(float size) const {
     if (!(size > finest_)) return 0.0f;  // no number, too
     return std::min(std::log2(size / finest_), float(kTopLevel));
   }
   Cell cell(const Vec3& position, uint32_t owner, int level) const {
-    const Vec3 at = (position - corner_) / finest_;
+    const Vec3 at = (position - corner_) * (1.0f / finest_);  // a power of two: exact
     const auto index = [&](float v) {
       return int32_t(std::floor(std::clamp(v, -0x1p30f, 0x1p30f))) >> level;  // nests: a parent is its children halved
     };
