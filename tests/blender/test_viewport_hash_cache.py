@@ -23,7 +23,8 @@ def test_cells_live_while_the_view_walks_and_switches(in_window: Run, blend_file
         def look(name):
             statistics = viewport().session.statistics()
             values = statistics['values']
-            seen.append({'name': name, 'status': addon().viewport.cache_status(statistics)[0], 'method': statistics['method'], **{key: values[key] for key in (
+            seen.append({'name': name, 'status': addon().viewport.cache_status(statistics)[0],
+                         'method': statistics['method'], **{key: values[key] for key in (
                 'cache_resets', 'cells', 'cache_paths')}})
             return view_picture().copy()
 

@@ -23,7 +23,8 @@ def kept(sums: Any, samples: int = 1, normal: Any = (0, 0, 1), frames: Any = 0, 
                               np.broadcast_to(frames, n), changed)
 
 
-@pytest.mark.parametrize("light", [(1.0, 1.0, 1.0), (1e6, 2e6, 3e6), (65504.0, 65505.0, 1e5), (1e-20, 1e-21, 0.0), (1e30, 1.0, 0.0)])
+@pytest.mark.parametrize("light", [(1.0, 1.0, 1.0), (1e6, 2e6, 3e6), (65504.0, 65505.0, 1e5), (1e-20, 1e-21, 0.0),
+                                   (1e30, 1.0, 0.0)])
 def test_light_beyond_halves(light: tuple[float, float, float]) -> None:
     found = kept([light])
     assert (np.abs(np.asarray(found["front"]) - light) <= UNIT * max(light)).all()
@@ -39,7 +40,8 @@ def test_sides_are_told_by_geometry() -> None:
         for first in (1, -1):
             found = kept([(1, 1, 1), (4, 4, 4)] if first > 0 else [(4, 4, 4), (1, 1, 1)], 1, [first * front, -first * front])
             assert found["front"] == (1, 1, 1) and found["back"] == (4, 4, 4) and found["counts"] == (1, 1)
-            assert np.asarray(found["normal"]) @ (front / np.linalg.norm(front)) > np.cos(np.radians(9))  # two updates, each to half of that
+            cosine = np.asarray(found["normal"]) @ (front / np.linalg.norm(front))
+            assert cosine > np.cos(np.radians(9))  # two updates, each to half of that
 
 
 def test_more_than_two_to_the_24_samples() -> None:
@@ -52,12 +54,14 @@ def test_more_than_two_to_the_24_samples() -> None:
 
 
 def test_means_neither_stall_nor_drift() -> None:
-    """A window of 2048 samples, units of 2^-10: rounding leaves sqrt(2048 / 12) units of noise, the samples half of sqrt(2 / 2048)."""
+    """A window of 2048 samples, units of 2^-10: rounding leaves sqrt(2048 / 12) units of noise, the samples half of
+    sqrt(2 / 2048)."""
     rng = np.random.default_rng(3)
     runs = np.array([kept(rng.exponential(size=(20_000, 1)).repeat(3, 1))["front"] for _ in range(24)])
     noise = (UNIT**2 * WINDOW / 12 + 1 / (2 * WINDOW)) ** 0.5
     assert abs(runs.mean() - 1) < 4.5 * noise / 24**0.5 + 1e-3 and runs.std() < 2 * noise
-    healed = np.array([kept(np.concatenate([np.full((5000, 3), 1.0 + i * 1e-3), np.full((20_000, 3), 1.2)]))["front"] for i in range(24)])
+    changes = [np.concatenate([np.full((5000, 3), 1.0 + i * 1e-3), np.full((20_000, 3), 1.2)]) for i in range(24)]
+    healed = np.array([kept(change)["front"] for change in changes])
     assert abs(healed.mean() - 1.2) < 4.5 * noise / 24**0.5
 
 

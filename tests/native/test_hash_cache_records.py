@@ -99,7 +99,8 @@ def test_keys_of_neighbours_differ_and_spread_evenly() -> None:
 
 def test_every_bit_of_a_cell_changes_half_of_its_key() -> None:
     rng = np.random.default_rng(3)
-    cells = np.concatenate([rng.integers(-2000, 2000, (4000, 3)), rng.integers(0, 2**20, (4000, 1)), rng.integers(0, 20, (4000, 1))], 1)
+    parts = [rng.integers(-2000, 2000, (4000, 3)), rng.integers(0, 2**20, (4000, 1)), rng.integers(0, 20, (4000, 1))]
+    cells = np.concatenate(parts, 1)
     keys = _native.cell_keys(cells)
     for column, bits in ((0, 20), (1, 20), (2, 20), (3, 32), (4, 5)):
         for bit in range(bits):

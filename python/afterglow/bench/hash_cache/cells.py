@@ -31,8 +31,9 @@ def occupied(context: Context) -> list[Figure]:
         figures.append(Figure(f"memory of all levels at {name}, data, maps and keys", "country_kitchen", size / 2**20, "MiB",
                               "table 1, without keys", goal / 2**20, size / goal, "≤ 1.0",
                               details={"peak_bytes": found["peak_bytes"]}).judged())
-        figures.append(Figure(f"most memory while building {name}, over the finished", "country_kitchen", found["peak_bytes"] / size,
-                              "", "", None, None, "≤ 1.5", details={"peak_bytes": found["peak_bytes"]}).judged())
+        figures.append(Figure(f"most memory while building {name}, over the finished", "country_kitchen",
+                              found["peak_bytes"] / size, "", "", None, None, "≤ 1.5",
+                              details={"peak_bytes": found["peak_bytes"]}).judged())
     seconds = half["seconds_mark"] + half["seconds_maps"]
     figures.append(Figure("build of 2048³", "country_kitchen", seconds, "s", "the paper, a graphics card", None, None, "≤ 6",
                           details={"mark": half["seconds_mark"], "maps": half["seconds_maps"]}).judged())
