@@ -80,6 +80,7 @@ struct Work {
 
 struct MethodStatistics {
   std::vector<std::pair<std::string, double>> values;  // records, rays, bytes, seconds a stage, reused, dropped, …
+  std::vector<std::string> warnings{};                 // what the user of this render should know
 };
 
 class IndirectMethod {

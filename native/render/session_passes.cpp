@@ -141,13 +141,15 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     BelievedError noise;
     const bool due = error_is_due(done) || (done >= 2 && done >= settings.samples);
     if (plan.step == 1 && due) noise = carries ? spread_of(film) : film.believed_error();
+    const MethodStatistics told = renderer.statistics();
+    for (const std::string& warning : told.warnings) warn(warning);
     {
       const std::lock_guard lock(mutex_);
       film_step_ = plan.step;
       statistics_.samples = done;
       if (noise.value >= 0.0f) statistics_.noise = noise;
       statistics_.seconds["render"] = in_passes;
-      for (const auto& [name, value] : renderer.statistics().values) statistics_.method_values[name] = value;
+      for (const auto& [name, value] : told.values) statistics_.method_values[name] = value;
       if (statistics_.passes.size() < 4096) statistics_.passes.push_back({plan.first, plan.count, plan.step, seconds});
     }
     const bool last =

@@ -238,7 +238,7 @@ def test_a_walk_of_the_camera_keeps_the_cells() -> None:
 
 
 def test_edits_forget_what_was() -> None:
-    live = Live(cornell_box())
+    live = Live(cornell_box(), hash_keep=0)
     lamp = live.built.lights["Lamp"]
     bright = live.session.read("diffuse_indirect").mean()
     dark = live.edit(lambda: live.built.scene.set_light(lamp, power=0.0))
@@ -265,6 +265,7 @@ def test_memory_has_a_limit() -> None:
     live = Live(cornell_box(), width=96, height=96, samples=1, hash_cell=0.25, hash_memory=1.0)
     afterglow.set_log(None)
     assert sum("hash_memory" in text for text in told) == 1
+    assert sum("hash_memory" in text for text in live.session.statistics()["warnings"]) == 1
     assert live.number("cache_bytes") < 1.1 * 2**20
     assert live.number("cells_refused") > 0
     truth = render(cornell_box(), size=32, samples=64, passes=["diffuse_indirect"],

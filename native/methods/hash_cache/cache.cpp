@@ -2,6 +2,7 @@
 // Filling and asking: see cache.h.
 #include "methods/hash_cache/cache.h"
 
+#include <algorithm>
 #include <chrono>
 
 #include "base/log.h"
@@ -14,11 +15,14 @@ namespace {
 constexpr float kFarthest = 0.04f;  // of the ray's length: how far look-ups may be scattered beyond the asked jitter
 constexpr float kEnough = 0.01f;    // share of the light that the levels above need not bring
 
-constexpr uint32_t kEven = 1024;  // samples from which on a cell shows no blotches
+constexpr size_t kFewProbes = 64;  // fewer paths do not tell what an edit changed
+constexpr uint32_t kEven = 1024;   // samples from which on a cell shows no blotches
+constexpr size_t kGroup = 32;      // questions whose cells are fetched from memory together
 constexpr size_t kFillBlock = 1024;
-constexpr size_t kGroup = 32;  // questions whose cells are fetched from memory together
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+uint64_t lost(const TableCounts& counts) { return counts.refused + counts.evicted; }
 
 /// Cells of few samples are blotches; look-ups that scatter farther make fine grain of them, which filters take away.
 float widened(uint32_t count) { return std::clamp(std::sqrt(float(kEven) / float(count + 1)), 1.0f, 6.0f); }
@@ -38,55 +42,115 @@ void Cache::configure(const CacheSettings& settings) {
   table_.set_limit(settings.limit);
 }
 
+void Cache::clear(const CommittedScene& scene) {
+  table_.clear();
+  healing_.clear();
+  grid_ = Grid(scene.scene.bounds());
+  counts_.resets++;
+  renders_ = stamp_ = 0;
+  forgotten_.clear();
+  pending_ = false;
+}
+
 void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Work& work) {
   SceneChanges seen = changes;
   seen.camera = false;
   const InstanceMask shown = work.shown ? *work.shown : InstanceMask{};
-  // Cells know objects by their numbers, which others take over when some come or go.
-  const bool renumbered = !changes.instances_added.empty() || !changes.instances_removed.empty();
-  const bool elsewhere = stale_ || renumbered || changes.everything || changes.origin || shown != shown_instances_;
-  if (elsewhere || (!seen.empty() && !settings_.keep)) {
-    table_.clear();
-    grid_ = Grid(scene.scene.bounds());
-    counts_.resets++;
-    renders_ = stamp_ = 0;
-  } else if (!seen.empty()) {
-    table_.forget(settings_.keep);
+  const bool elsewhere = stale_ || changes.everything || changes.origin || shown != shown_instances_;
+  const bool edit = pending_ || !seen.empty();
+  shown_instances_ = shown;
+  if (elsewhere || (edit && (!settings_.keep || healing_.probe_count() < kFewProbes))) {
+    clear(scene);
+  } else if (edit) {
+    edited(scene, changes, work);
   }
   stale_ = false;
-  shown_instances_ = shown;
+  lost_before_ = lost(table_.counts());
   seed_ = hash(hash(uint32_t(work.seed), uint32_t(work.seed >> 32)), renders_++, 0x48617368u);  // never a path twice
-  stamp_++;
+  next_pass();
   pass_ = work.pass;
+}
+
+void Cache::next_pass() {
+  healing_.begin_pass(++stamp_);
+  while (healing_.due()) table_.drop_older(healing_.retire(), stamp_);
+}
+
+/// What a stopped update left to do is done by the next one: no cell got a sample in between.
+void Cache::edited(const CommittedScene& scene, const SceneChanges& changes, const Work& work) {
+  const double begun = now();
+  pending_ = true;
+  // Cells know objects by their places in the scene's list, which others may take over.
+  const auto named = [](const std::vector<Handle>& sorted, Handle handle) {
+    return std::binary_search(sorted.begin(), sorted.end(), handle);
+  };
+  const auto& instances = scene.scene.instances();
+  for (uint32_t i = 0; i < instances.size(); ++i)
+    if (named(changes.instances_added, instances[i].handle) ||
+        named(changes.meshes_deformed, instances[i].mesh_handle) ||
+        named(changes.meshes_replaced, instances[i].mesh_handle) ||
+        named(changes.meshes_added, instances[i].mesh_handle))
+      forgotten_.push_back(i);
+  for (const MovedInstance& m : changes.instances_moved) forgotten_.push_back(scene.scene.instance_index(m.instance));
+  std::sort(forgotten_.begin(), forgotten_.end());
+  forgotten_.erase(std::unique(forgotten_.begin(), forgotten_.end()), forgotten_.end());
+  RayCounts rays;
+  const std::vector<Rgb> light =
+      walk_again(walk_scene(scene), {grid_, table_, healing_}, settings_.caching, healing_.probes(), work, rays);
+  if (light.empty()) return;
+  counts_.edits++;
+  counts_.walked_again += healing_.probe_count();
+  counts_.rays += rays.bounce, counts_.shadow_rays += rays.shadow;
+  healing_.edit(grid_, light, std::move(forgotten_), stamp_ + 1, settings_.keep);
+  forgotten_.clear();
+  pending_ = false;
+  counts_.seconds_edits += now() - begun;
+}
+
+/// Every stored vertex counts its own scatterings.
+WalkScene Cache::walk_scene(const CommittedScene& scene) const {
+  WalkScene walk{scene, settings_.caching.walk.limits, shown_instances_.empty() ? nullptr : &shown_instances_, false};
+  const uint32_t more = settings_.caching.store;
+  walk.limits.max_bounces += more, walk.limits.diffuse += more, walk.limits.glossy += more;
+  walk.limits.transmission += more, walk.limits.transparent += more;
+  return walk;
+}
+
+std::string Cache::warning() const {
+  if (lost(table_.counts()) == lost_before_) return {};
+  return "HashCache: its memory of " + std::to_string(settings_.limit >> 20) +
+         " MiB is full; cells that got no light for longest make room. More memory (hash_memory) or larger cells "
+         "(hash_cell) keep them.";
 }
 
 bool Cache::trace(const WalkScene& walk, std::span<const CachePoint> points, std::span<const uint32_t> chosen,
                   Work& work) {
   const double begun = now();
   RayCounts rays;
-  std::vector<Sample> samples = cache_paths(walk, grid_, table_, settings_.caching, points, chosen, seed_, work, rays);
+  std::vector<Probe> whole;
+  std::vector<Sample> samples =
+      cache_paths(walk, {grid_, table_, healing_}, settings_.caching, points, chosen, seed_, work, rays, whole);
   const double traced = now();
   counts_.seconds_paths += traced - begun;
   if (work.stop.stop()) return false;
   counts_.paths += chosen.size(), counts_.samples += samples.size();
   counts_.rays += rays.bounce, counts_.shadow_rays += rays.shadow, counts_.dropped += rays.dropped;
-  const bool told = table_.counts().refused || table_.counts().evicted;
-  counts_.cells += table_.add(std::move(samples), stamp_, work.threads, work.stop);
+  const bool told = lost(table_.counts());
+  healing_.keep(grid_, whole);
+  Table::Mend mend;
+  if (healing_.active()) mend = [this](Record& record, const Cell& cell) { healing_.mend(record, cell); };
+  counts_.cells += table_.add(std::move(samples), stamp_, work.threads, work.stop, mend);
   counts_.seconds_table += now() - traced;
-  if (!told && (table_.counts().refused || table_.counts().evicted))
-    log_message("warning",
-                "HashCache: its memory of " + std::to_string(settings_.limit >> 20) +
-                    " MiB is full; cells that got no light for longest make room. More memory (hash_memory) or "
-                    "larger cells (hash_cell) keep them.");
+  if (!told && lost(table_.counts())) log_message("warning", warning());
   return !work.stop.stop();
 }
 
 void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points, Work& work) {
-  if (work.pass != pass_) pass_ = work.pass, stamp_++;
-  WalkScene walk{scene, settings_.caching.walk.limits, shown_instances_.empty() ? nullptr : &shown_instances_, false};
-  const uint32_t more = settings_.caching.store;  // every stored vertex counts its own scatterings
-  walk.limits.max_bounces += more, walk.limits.diffuse += more, walk.limits.glossy += more;
-  walk.limits.transmission += more, walk.limits.transparent += more;
+  if (work.pass != pass_) {
+    pass_ = work.pass;
+    next_pass();
+  }
+  const WalkScene walk = walk_scene(scene);
   // Cells that are there already get paths more rarely the more they hold; points without one are asked for holes.
   const float resolution = work.extra ? 0.0f : settings_.resolution;
   // The first few paths fill cells in which the others end. What is left has no path; its own cell may be empty.
@@ -97,19 +161,20 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   parallel_blocks(points.size(), kFillBlock, work.threads, [&](size_t begin, size_t end) {
     uint64_t keys[kGroup];
     auto& counts = places[begin / kFillBlock] = {};
+    Cell cells[kGroup];
     for (size_t at = begin; at < end; at += kGroup) {
       const size_t n = std::min(kGroup, end - at);
       for (size_t k = 0; k < n; ++k) {
         const CachePoint& p = points[at + k];
         const int level = int(grid_.level(p.footprint * settings_.caching.cell_pixels));
-        keys[k] = key_of(grid_.cell(p.position, owner_of(p.instance, p.face_normal), level));
+        keys[k] = key_of(cells[k] = grid_.cell(p.position, owner_of(p.instance, p.face_normal), level));
         table_.prefetch(keys[k]);
       }
       for (size_t k = 0; k < n; ++k) {
-        const Record* r = table_.find(keys[k]);
-        const float share = resolution * share_of_paths(r ? r->count() : 0, settings_.enough);
+        const Known known = find(cells[k], keys[k]);
+        const float share = resolution * share_of_paths(known.count, settings_.enough);
         const float u = unit_float(hash(hash_of(points[at + k], seed_), points[at + k].sample, 1));
-        Kind kind = r ? kNone : kEmpty;
+        Kind kind = known ? kNone : kEmpty;
         if (u < share) kind = u < 0.03f * share ? kFirst : u < 0.2f * share ? kSecond : kThird;
         kinds[at + k] = kind;
         if (kind != kNone) counts[kind]++;
@@ -145,17 +210,16 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
 }
 
 /// At a place beside the point, where there is such a cell of the same object and side, else at the point.
-const Record* Cache::look_up(const CachePoint& p, const Vec3& offset, uint32_t owner, int level) const {
-  const Record* record = table_.find(grid_.cell(p.position + offset * grid_.size(level), owner, level));
-  return record ? record : table_.find(grid_.cell(p.position, owner, level));
+Known Cache::look_up(const CachePoint& p, const Vec3& offset, uint32_t owner, int level) const {
+  const Known known = find(grid_.cell(p.position + offset * grid_.size(level), owner, level));
+  return known ? known : find(grid_.cell(p.position, owner, level));
 }
 
 /// Whether no cell at all could answer.
 bool Cache::open(const CachePoint& p) const {
   const uint32_t owner = owner_of(p.instance, p.face_normal);
   for (int level = int(grid_.level(p.footprint * settings_.caching.cell_pixels)); level <= kTopLevel; ++level)
-    if (table_.find(grid_.cell(p.position, owner, level)) ||
-        table_.find(grid_.cell(p.position, owner | kOnTheWay, level)))
+    if (find(grid_.cell(p.position, owner, level)) || find(grid_.cell(p.position, owner | kOnTheWay, level)))
       return false;
   return true;
 }
@@ -172,7 +236,8 @@ Cache::LookUp Cache::first_look(const CachePoint& p) const {
     look.offset = settings_.jitter *
                   ((2.0f * unit_float(random) - 1.0f) * frame.t + (2.0f * unit_float(second) - 1.0f) * frame.b);
   }
-  look.key = key_of(grid_.cell(p.position + look.offset * grid_.size(look.level), look.owner, look.level));
+  look.cell = grid_.cell(p.position + look.offset * grid_.size(look.level), look.owner, look.level);
+  look.key = key_of(look.cell);
   return look;
 }
 
@@ -180,10 +245,11 @@ Cache::LookUp Cache::first_look(const CachePoint& p) const {
 void Cache::wider(const CachePoint& p, LookUp& look) const {
   if (!(settings_.jitter > 0.0f)) return;
   const float farthest = kFarthest * p.segment / (settings_.jitter * grid_.size(look.level));
-  const float wide = std::max(1.0f, std::min(widened(look.first ? look.first->count() : 0), farthest));
+  const float wide = std::max(1.0f, std::min(widened(look.first.count), farthest));
   if (!(wide > 1.0f)) return;
   look.offset *= wide;
-  look.key = key_of(grid_.cell(p.position + look.offset * grid_.size(look.level), look.owner, look.level));
+  look.cell = grid_.cell(p.position + look.offset * grid_.size(look.level), look.owner, look.level);
+  look.key = key_of(look.cell);
   table_.prefetch(look.key);
 }
 
@@ -194,8 +260,8 @@ void Cache::answer(std::span<const CachePoint> points, std::span<Answer> answers
     for (size_t k = 0; k < n; ++k) table_.prefetch((looks[k] = first_look(points[at + k])).key);
     for (size_t k = 0; k < n; ++k) {
       LookUp& look = looks[k];
-      look.first = table_.find(look.key);
-      look.settled = look.first && look.first->count() >= kEven;
+      look.first = find(look.cell, look.key);
+      look.settled = look.first.count >= kEven;
       if (!look.settled) wider(points[at + k], look);
     }
     for (size_t k = 0; k < n; ++k) answers[at + k] = resolve(points[at + k], looks[k]);
@@ -203,10 +269,10 @@ void Cache::answer(std::span<const CachePoint> points, std::span<Answer> answers
 }
 
 Answer Cache::resolve(const CachePoint& p, const LookUp& look) const {
-  const Record* record = look.settled ? look.first : table_.find(look.key);
-  if (!record) record = look.first;
-  if (record && float(record->count()) >= settings_.trusted)
-    return {kPi * shown(*record, p, look.level), 1.0f, 1.0f / std::sqrt(1.0f + float(record->count()))};
+  Known known = look.settled ? look.first : find(look.cell, look.key);
+  if (!known) known = look.first;
+  if (float(known.count) >= settings_.trusted)
+    return {kPi * shown(known, p, look.level), 1.0f, 1.0f / std::sqrt(1.0f + float(known.count))};
   return blend(p, look);
 }
 
@@ -214,40 +280,40 @@ Answer Cache::resolve(const CachePoint& p, const LookUp& look) const {
 Answer Cache::blend(const CachePoint& p, const LookUp& look) const {
   Rgb light(0.0f);
   float missing = 1.0f, samples = 0.0f;
-  const auto take = [&](const Record& record, int level) {
-    const float taken = missing * trust(record.count(), settings_.trusted);
-    light += taken * shown(record, p, level);
-    samples += taken * float(record.count());
+  const auto take = [&](const Known& known, int level) {
+    const float taken = missing * trust(known.count, settings_.trusted);
+    light += taken * shown(known, p, level);
+    samples += taken * float(known.count);
     missing -= taken;
   };
   for (int level = look.level; level <= kTopLevel && missing > kEnough; ++level) {
     // A cell longer than the way that the ray came holds light of places that the ray has left long ago.
     if (level > look.level && missing < 1.0f && grid_.size(level) > p.segment) break;
-    if (const Record* record = look_up(p, look.offset, look.owner, level)) take(*record, level);
+    if (const Known known = look_up(p, look.offset, look.owner, level)) take(known, level);
   }
   // Where the camera's paths have left nothing at all: what others found there, without the last of their bounces.
   for (int level = look.level; level <= kTopLevel && !(missing < 1.0f); ++level)
-    if (const Record* record = look_up(p, look.offset, look.owner | kOnTheWay, level)) take(*record, level);
+    if (const Known known = look_up(p, look.offset, look.owner | kOnTheWay, level)) take(known, level);
   if (!(missing < 1.0f)) return {};
   const float found = 1.0f - missing;
   return {kPi / found * light, 1.0f, 1.0f / std::sqrt(1.0f + samples / found)};
 }
 
 /// Light, or what a debug view shows in its place.
-Rgb Cache::shown(const Record& record, const CachePoint& p, int level) const {
+Rgb Cache::shown(const Known& known, const CachePoint& p, int level) const {
   switch (settings_.view) {
     case View::kLight:
-      return record.light();
+      return known.light;
     case View::kLevel:
       return scale_color(float(level % 8) / 7.0f);
     case View::kCount:
-      return scale_color(std::log2(float(record.count())) / 20.0f);
+      return scale_color(std::log2(float(known.count)) / 20.0f);
     case View::kAge:
-      return scale_color(float((stamp_ - record.stamp()) % Record::kStamps) / 64.0f);
+      return scale_color(float((stamp_ - known.stamp) % Record::kStamps) / 64.0f);
     case View::kSide:
       return 0.5f + 0.5f * p.face_normal;
   }
-  return record.light();
+  return known.light;
 }
 
 }  // namespace afterglow::hash_cache

@@ -17,20 +17,21 @@ struct CacheSettings {
   float jitter = 0.5f;      // of look-ups, in cell widths (s_j)
   float trusted = 32.0f;    // samples from which on a cell answers alone
   float enough = 128.0f;    // samples from which on a cell gets paths more rarely
-  uint32_t keep = 0;        // samples that a cell keeps when the scene changes; 0: starts anew
+  uint32_t keep = 0;        // samples that old light counts for at most when the scene changes; 0: starts anew
   size_t limit = size_t(1) << 30;
   View view = View::kLight;
 };
 
 struct CacheCounts {
-  uint64_t paths = 0, samples = 0, cells = 0, rays = 0, shadow_rays = 0, dropped = 0, holes = 0, resets = 0;
-  double seconds_paths = 0.0, seconds_table = 0.0;
+  uint64_t paths = 0, samples = 0, cells = 0, rays = 0, shadow_rays = 0, dropped = 0, holes = 0, resets = 0, edits = 0,
+           walked_again = 0;
+  double seconds_paths = 0.0, seconds_table = 0.0, seconds_edits = 0.0;
 };
 
 class Cache {
  public:
   void configure(const CacheSettings&);
-  /// What the edits touched is forgotten: everything, or all but a few samples of each cell.
+  /// After edits: some paths are walked again, and cells keep what these say that still holds; or starts anew.
   void update(const CommittedScene&, const SceneChanges&, Work&);
   /// One path from each chosen point, and from each that no cell could answer.
   void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
@@ -39,6 +40,9 @@ class Cache {
   void load(const CommittedScene&, std::span<const char>);
   const CacheCounts& counts() const { return counts_; }
   const Table& table() const { return table_; }
+  /// What the user should know when cells did not fit since update(); else nothing.
+  std::string warning() const;
+  const Healing& healing() const { return healing_; }
 
  private:
   /// One question: which cell, read first at `offset` cells beside the point, and what else is asked then.
@@ -46,25 +50,39 @@ class Cache {
     uint32_t owner = 0;
     int level = 0;
     Vec3 offset{0.0f};  // in cells
+    Cell cell;
     uint64_t key = 0;
-    const Record* first = nullptr;
+    Known first;
     bool settled = false;
   };
   LookUp first_look(const CachePoint&) const;
   void wider(const CachePoint&, LookUp&) const;
   Answer resolve(const CachePoint&, const LookUp&) const;
   Answer blend(const CachePoint&, const LookUp&) const;
-  const Record* look_up(const CachePoint&, const Vec3& offset, uint32_t owner, int level) const;
+  Known look_up(const CachePoint&, const Vec3& offset, uint32_t owner, int level) const;
+  Known find(const Cell& cell, uint64_t key) const {
+    const Record* r = table_.find(key);
+    return r ? healing_.known(*r, cell) : Known{};
+  }
+  Known find(const Cell& cell) const { return find(cell, key_of(cell)); }
+  WalkScene walk_scene(const CommittedScene&) const;
+  void clear(const CommittedScene&);
+  void edited(const CommittedScene&, const SceneChanges&, const Work&);
+  void next_pass();
   bool open(const CachePoint&) const;
-  Rgb shown(const Record&, const CachePoint&, int level) const;
+  Rgb shown(const Known&, const CachePoint&, int level) const;
   bool trace(const WalkScene&, std::span<const CachePoint>, std::span<const uint32_t> chosen, Work&);
 
   CacheSettings settings_;
   bool stale_ = true;
   Grid grid_;
   Table table_;
+  Healing healing_;
+  std::vector<uint32_t> forgotten_;  // objects, of edits that no path was walked again for yet
+  bool pending_ = false;             // there are such edits
   InstanceMask shown_instances_;
   uint32_t seed_ = 0, renders_ = 0, stamp_ = 0, pass_ = 0;
+  uint64_t lost_before_ = 0;  // cells that went or were refused before this render
   CacheCounts counts_;
 };
 

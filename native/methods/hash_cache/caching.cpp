@@ -5,6 +5,7 @@
 #include "methods/hash_cache/caching.h"
 
 #include <algorithm>
+#include <limits>
 #include <mutex>
 
 #include "base/parallel.h"
@@ -34,11 +35,11 @@ struct Stored {
 
 struct PathInput {
   const WalkScene& walk;
-  const Grid& grid;
-  const Table& table;
+  const Cells& cells;
   const CachingSettings& settings;
   WalkLimits limits;  // of each stored vertex
   uint32_t seed;
+  bool whole = false;  // no path ends in a cell
 };
 
 class StoringVisitor {
@@ -54,9 +55,9 @@ class StoringVisitor {
   void begin(const CachePoint& p, PathContext& context) {
     count_ = 0, pending_ = 0;
     const uint32_t random = hash(hash_of(p, in_.seed), p.sample, 3);
-    may_end_ = !(unit_float(random) < in_.settings.long_paths);
+    may_end_ = !in_.whole && !(unit_float(random) < in_.settings.long_paths);
     answered_ = false;
-    level_ = std::min(int(in_.grid.level(p.footprint * in_.settings.cell_pixels)) + kFartherLevels, kTopLevel);
+    level_ = std::min(int(in_.cells.grid.level(p.footprint * in_.settings.cell_pixels)) + kFartherLevels, kTopLevel);
     jitter_ = {unit_float(hash(random)) - 0.5f, unit_float(hash(random, 1u)) - 0.5f};
     vertices_ = 1;
     Stored& first = stored_[count_++] = Stored{};
@@ -75,6 +76,7 @@ class StoringVisitor {
 
   void traced(const Ray&, bool) {}
   bool answered() const { return answered_; }
+  bool may_end() const { return may_end_; }
   bool surface(const PathState& path, const SurfacePoint& point, const Surface& surface) {
     pending_ = count_;
     answered_ = false;
@@ -153,27 +155,28 @@ class StoringVisitor {
   bool end(const PathState& path, const SurfacePoint& point, const Surface& surface, bool front, bool back) {
     if (stored_[0].last) return false;
     const float longest = kLongest * path.context.ray_length;
-    const Record* records[2] = {};
+    Known records[2] = {};
     if (front && !(records[0] = settled(point, 1.0f, longest))) return false;
     if (back && !(records[1] = settled(point, -1.0f, longest))) return false;
     Rgb light(0.0f);
     for (int i = 0; i < surface.count; ++i)
       if (surface.lobes[i].kind < LobeKind::kMicrofacetReflection)
-        light += surface.lobes[i].weight * records[surface.lobes[i].kind == LobeKind::kTranslucent]->light();
+        light += surface.lobes[i].weight * records[surface.lobes[i].kind == LobeKind::kTranslucent].light;
     for (uint32_t i = 0; i < count_; ++i)
       if (Stored& s = stored_[i]; s.live && !s.last) s.light += s.throughput * light;
     return true;
   }
-  const Record* settled(const SurfacePoint& point, float side, float longest) const {
+  Known settled(const SurfacePoint& point, float side, float longest) const {
+    const Grid& grid = in_.cells.grid;
     const uint32_t owner = owner_of(point.instance, point.face_normal * side) | kOnTheWay;
     const Frame frame(point.face_normal);
     const Vec3 offset = jitter_.x * frame.t + jitter_.y * frame.b;
-    for (int level = level_; level <= kTopLevel && in_.grid.size(level) <= longest; ++level) {
-      const Record* r = in_.table.find(in_.grid.cell(point.position + offset * in_.grid.size(level), owner, level));
-      if (!r || r->count() < kSettled) r = in_.table.find(in_.grid.cell(point.position, owner, level));
-      if (r && r->count() >= kSettled) return r;
+    for (int level = level_; level <= kTopLevel && grid.size(level) <= longest; ++level) {
+      Known k = in_.cells.find(grid.cell(point.position + offset * grid.size(level), owner, level));
+      if (k.count < kSettled) k = in_.cells.find(grid.cell(point.position, owner, level));
+      if (k.count >= kSettled) return k;
     }
-    return nullptr;
+    return {};
   }
 
   void store(const SurfacePoint& point, float side) {
@@ -221,49 +224,85 @@ Rgb direct_light(const PathInput& in, const CachePoint& p, float u_light, const 
 }
 
 template <uint32_t kFeatures>
+void walk_from(const PathInput& in, const Walker<kFeatures>& walker, const CachePoint& p, StoringVisitor& visitor,
+               RayCounts& counts) {
+  Sampler sampler(hash_of(p, in.seed), p.sample);
+  const Vec2 u = sampler.next2();
+  PathState path;
+  visitor.begin(p, path.context);
+  const float radius = std::sqrt(u.x), phi = 2.0f * kPi * u.y, z = std::sqrt(std::fmax(0.0f, 1.0f - u.x));
+  const Vec3 direction = Frame(p.normal).to_world({radius * std::cos(phi), radius * std::sin(phi), z});
+  const bool last = visitor.stored()[0].last;
+  if (in.settings.direct)
+    visitor.add_direct(
+        direct_light<kFeatures>(in, p, unit_float(hash(hash_of(p, in.seed), p.sample, 4)), sampler.next2(), counts));
+  if (!(z > 0.0f && glm::dot(direction, p.face_normal) > 0.0f && (!last || in.settings.direct))) return;
+  path.last = last;
+  path.density = z * kInvPi;
+  path.position = p.position, path.light_normal = p.normal;
+  path.ray.origin = offset_origin(start_of(p), direction);
+  path.ray.direction = direction;
+  path.ray.mask = visibility_of(path.context.kind);
+  path.context.footprint = p.footprint;
+  walker.walk(path, sampler, visitor);
+  counts.camera--, counts.bounce++;  // no ray of the camera
+}
+
+bool usable(const Rgb& light) { return std::fabs(light.x) + std::fabs(light.y) + std::fabs(light.z) <= kMostLight; }
+
+Rgb clamped(const PathInput& in, const Rgb& light) {
+  const float sum = light.x + light.y + light.z, limit = in.settings.walk.clamp_indirect;
+  return glm::max(sum > limit ? light * (limit / sum) : light, Rgb(0.0f));
+}
+
+template <uint32_t kFeatures>
 void trace(const PathInput& in, std::span<const CachePoint> points, std::span<const uint32_t> chosen,
-           std::vector<Sample>& out, RayCounts& counts) {
+           std::vector<Sample>& out, std::vector<Probe>& whole, RayCounts& counts) {
   const Walker<kFeatures> walker(in.walk, counts);
   StoringVisitor visitor(in);
   for (const uint32_t index : chosen) {
     const CachePoint& p = points[index];
-    Sampler sampler(hash_of(p, in.seed), p.sample);
-    const Vec2 u = sampler.next2();
-    PathState path;
-    visitor.begin(p, path.context);
-    const float radius = std::sqrt(u.x), phi = 2.0f * kPi * u.y, z = std::sqrt(std::fmax(0.0f, 1.0f - u.x));
-    const Vec3 direction = Frame(p.normal).to_world({radius * std::cos(phi), radius * std::sin(phi), z});
-    const bool last = visitor.stored()[0].last;
-    if (in.settings.direct)
-      visitor.add_direct(
-          direct_light<kFeatures>(in, p, unit_float(hash(hash_of(p, in.seed), p.sample, 4)), sampler.next2(), counts));
-    if (z > 0.0f && glm::dot(direction, p.face_normal) > 0.0f && (!last || in.settings.direct)) {
-      path.last = last;
-      path.density = z * kInvPi;
-      path.position = p.position, path.light_normal = p.normal;
-      path.ray.origin = offset_origin(start_of(p), direction);
-      path.ray.direction = direction;
-      path.ray.mask = visibility_of(path.context.kind);
-      path.context.footprint = p.footprint;
-      walker.walk(path, sampler, visitor);
-      counts.camera--, counts.bounce++;  // no ray of the camera
-    }
-    const int level = int(in.grid.level(p.footprint * in.settings.cell_pixels));
+    walk_from(in, walker, p, visitor, counts);
+    const int level = int(in.cells.grid.level(p.footprint * in.settings.cell_pixels));
     for (const Stored& s : visitor.stored()) {
       if (!s.sampled) continue;
       const bool first = &s == visitor.stored().data();
       const int at = first ? level : std::min(level + kFartherLevels, kTopLevel);
       const uint32_t owner = owner_of(s.instance, s.face_normal) | (first ? 0u : kOnTheWay);
-      const float sum = s.light.x + s.light.y + s.light.z;
-      if (!(std::fabs(s.light.x) + std::fabs(s.light.y) + std::fabs(s.light.z) <= kMostLight)) {
+      if (!usable(s.light)) {
         counts.dropped++;
         continue;
       }
-      const float limit = in.settings.walk.clamp_indirect;
-      const Rgb light = glm::max(sum > limit ? s.light * (limit / sum) : s.light, Rgb(0.0f));
-      out.push_back({in.grid.cell(s.position, owner, at), light, 1});
+      const Rgb light = clamped(in, s.light);
+      if (first && !visitor.may_end()) whole.push_back({p, in.seed, level, light});
+      out.push_back({in.cells.grid.cell(s.position, owner, at), light, 1});
     }
   }
+}
+
+template <uint32_t kFeatures>
+void trace_again(PathInput in, std::span<const Probe> probes, std::span<Rgb> light, RayCounts& counts) {
+  const Walker<kFeatures> walker(in.walk, counts);
+  StoringVisitor visitor(in);
+  for (size_t i = 0; i < probes.size(); ++i) {
+    if (!probes[i].seed) continue;
+    in.seed = probes[i].seed;
+    walk_from(in, walker, probes[i].point, visitor, counts);
+    const Rgb& found = visitor.stored()[0].light;
+    if (usable(found)) light[i] = clamped(in, found);
+  }
+}
+
+constexpr uint32_t kPlain = kFeatureLobes | kFeatureShapes, kWinding = kPlain | kFeatureStraight;
+
+bool goes_straight(const WalkScene& walk) {
+  return walk.scene.effects.has(kTransparency) || walk.scene.effects.has(kRayVisibility) || walk.shown;
+}
+
+PathInput input_of(const WalkScene& walk, const Cells& cells, const CachingSettings& settings, uint32_t seed) {
+  PathInput in{walk, cells, settings, settings.walk.limits, seed};
+  if (settings.length) in.limits.max_bounces = std::min(in.limits.max_bounces, settings.length);
+  return in;
 }
 
 }  // namespace
@@ -277,22 +316,20 @@ bool CachingSettings::operator==(const CachingSettings& o) const {
          walk.clamp_indirect == o.walk.clamp_indirect;
 }
 
-std::vector<Sample> cache_paths(const WalkScene& walk, const Grid& grid, const Table& table,
-                                const CachingSettings& settings, std::span<const CachePoint> points,
-                                std::span<const uint32_t> chosen, uint32_t seed, const Work& work, RayCounts& counts) {
-  PathInput in{walk, grid, table, settings, settings.walk.limits, seed};
-  if (settings.length) in.limits.max_bounces = std::min(in.limits.max_bounces, settings.length);
-  const bool straight = walk.scene.effects.has(kTransparency) || walk.scene.effects.has(kRayVisibility) || walk.shown;
+std::vector<Sample> cache_paths(const WalkScene& walk, const Cells& cells, const CachingSettings& settings,
+                                std::span<const CachePoint> points, std::span<const uint32_t> chosen, uint32_t seed,
+                                const Work& work, RayCounts& counts, std::vector<Probe>& whole) {
+  const PathInput in = input_of(walk, cells, settings, seed);
   std::vector<std::vector<Sample>> blocks((chosen.size() + kBlock - 1) / kBlock);
+  std::vector<std::vector<Probe>> probes(blocks.size());
   std::mutex mutex;
   parallel_blocks(
       chosen.size(), kBlock, work.threads,
       [&](size_t begin, size_t end) {
         if (work.stop.stop()) return;
         RayCounts own;
-        (straight ? trace<kFeatureLobes | kFeatureShapes | kFeatureStraight>
-                  : trace<kFeatureLobes | kFeatureShapes>)(in, points, chosen.subspan(begin, end - begin),
-                                                           blocks[begin / kBlock], own);
+        (goes_straight(walk) ? trace<kWinding> : trace<kPlain>)(in, points, chosen.subspan(begin, end - begin),
+                                                                blocks[begin / kBlock], probes[begin / kBlock], own);
         const std::lock_guard lock(mutex);
         counts += own;
       },
@@ -306,7 +343,30 @@ std::vector<Sample> cache_paths(const WalkScene& walk, const Grid& grid, const T
     for (size_t b = begin; b < end; ++b)
       std::copy(blocks[b].begin(), blocks[b].end(), samples.begin() + ptrdiff_t(first[b]));
   });
+  for (const auto& block : probes) whole.insert(whole.end(), block.begin(), block.end());
   return samples;
+}
+
+std::vector<Rgb> walk_again(const WalkScene& walk, const Cells& cells, const CachingSettings& settings,
+                            std::span<const Probe> probes, const Work& work, RayCounts& counts) {
+  PathInput in = input_of(walk, cells, settings, 0);
+  in.whole = true;
+  std::vector<Rgb> light(probes.size(), Rgb(std::numeric_limits<float>::quiet_NaN()));
+  std::mutex mutex;
+  parallel_blocks(
+      probes.size(), kBlock, work.threads,
+      [&](size_t begin, size_t end) {
+        if (work.stop.stop()) return;
+        RayCounts own;
+        (goes_straight(walk) ? trace_again<kWinding>
+                             : trace_again<kPlain>)(in, probes.subspan(begin, end - begin),
+                                                    std::span(light).subspan(begin, end - begin), own);
+        const std::lock_guard lock(mutex);
+        counts += own;
+      },
+      work.stop);
+  if (work.stop.stop()) light.clear();
+  return light;
 }
 
 }  // namespace afterglow::hash_cache

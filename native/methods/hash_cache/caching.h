@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "methods/hash_cache/table.h"
+#include "methods/hash_cache/healing.h"
 #include "methods/method.h"
 #include "methods/walk_settings.h"
 #include "transport/path_walker.h"
@@ -28,12 +28,26 @@ struct CachingSettings {
 /// mean towards the part of a cell that faces other surfaces. They fill larger cells of their own.
 inline constexpr int kFartherLevels = 2;
 
-/// Paths from the chosen points, each a function of its point, of `seed` and of what the table holds: samples in the
-/// order of the choice. Most paths end at their second surface, where a cell on the way knows the rest. Nothing, when
-/// stopped.
-std::vector<Sample> cache_paths(const WalkScene&, const Grid&, const Table&, const CachingSettings&,
+/// The cells that paths may end in.
+struct Cells {
+  const Grid& grid;
+  const Table& table;
+  const Healing& healing;
+  Known find(const Cell& cell) const {
+    const Record* r = table.find(cell);
+    return r ? healing.known(*r, cell) : Known{};
+  }
+};
+
+/// Paths from the chosen points, each a function of its point, of `seed` and of what the cells hold: samples in the
+/// order of the choice. Most paths end at their second surface, where a cell on the way knows the rest; those that
+/// never do are told in `whole`. Nothing, when stopped.
+std::vector<Sample> cache_paths(const WalkScene&, const Cells&, const CachingSettings&,
                                 std::span<const CachePoint> points, std::span<const uint32_t> chosen, uint32_t seed,
-                                const Work&, RayCounts&);
+                                const Work&, RayCounts&, std::vector<Probe>& whole);
+/// The light that each of these whole paths brings now (no number: none, or not finite). Nothing, when stopped.
+std::vector<Rgb> walk_again(const WalkScene&, const Cells&, const CachingSettings&, std::span<const Probe>, const Work&,
+                            RayCounts&);
 
 /// A number of its own for every question of an image.
 inline uint32_t hash_of(const CachePoint& p, uint32_t seed) {

@@ -49,7 +49,8 @@ bool same_scene(const Header& a, const Header& b) {
 }  // namespace
 
 std::vector<char> Cache::save(const CommittedScene& scene) const {
-  const std::vector<Entry> records = table_.sorted();
+  std::vector<Entry> records = table_.sorted();
+  std::erase_if(records, [&](const Entry& e) { return healing_.stale(e.record); });  // they hold old light
   if (stale_ || !shown_instances_.empty()) return {};
   Header h = header_of(scene.scene);
   h.records = records.size();
@@ -89,6 +90,9 @@ void Cache::load(const CommittedScene& scene, std::span<const char> bytes) {
     before = e.key;
   }
   table_.restore(records);
+  healing_.clear();
+  pending_ = false;
+  forgotten_.clear();
   grid_ = Grid(h.finest, Vec3(h.corner[0], h.corner[1], h.corner[2]));
   CachingSettings& s = settings_.caching;
   WalkLimits& l = s.walk.limits;

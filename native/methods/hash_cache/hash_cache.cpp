@@ -11,6 +11,7 @@ namespace {
 
 constexpr uint32_t kLights = 2;
 constexpr float kExtra = 2.0f;
+constexpr uint32_t kKeep = 1000000;
 constexpr const char* kViews[] = {"LIGHT", "LEVEL", "COUNT", "AGE", "SIDE"};
 
 View view_of(const SettingValue& value) {
@@ -33,6 +34,7 @@ class HashCache final : public IndirectMethod {
     running_ = true;
     lights_ = kLights;
     extra_ = kExtra;
+    s.keep = kKeep;
     direct_ = false;
     s.caching.walk.configure(settings);
     bool denoised = false;
@@ -76,6 +78,7 @@ class HashCache final : public IndirectMethod {
   MethodStatistics statistics() const override {
     const CacheCounts& c = cache_.counts();
     const TableCounts& t = cache_.table().counts();
+    const std::string warning = cache_.warning();
     return {{{"cells", double(cache_.table().size())},
              {"cells_new", double(t.added)},
              {"cells_evicted", double(t.evicted)},
@@ -88,9 +91,16 @@ class HashCache final : public IndirectMethod {
              {"cache_shadow_rays", double(c.shadow_rays)},
              {"cache_dropped", double(c.dropped)},
              {"cache_resets", double(c.resets)},
+             {"cache_edits", double(c.edits)},
+             {"cache_paths_again", double(c.walked_again)},
+             {"cache_ratio", double(luminance(cache_.healing().whole().ratio))},
+             {"cache_unexplained", double(cache_.healing().whole().unexplained)},
              {"cache_bytes", double(cache_.table().bytes())},
+             {"cache_edit_bytes", double(cache_.healing().bytes())},
+             {"seconds_edits", c.seconds_edits},
              {"seconds_paths", c.seconds_paths},
-             {"seconds_table", c.seconds_table}}};
+             {"seconds_table", c.seconds_table}},
+            warning.empty() ? std::vector<std::string>{} : std::vector<std::string>{warning}};
   }
 
  private:
@@ -143,16 +153,20 @@ MethodDescription describe() {
       "Renders of a scene and view that did not change since the last, but for the seed, go on with its picture", "",
       true, 0.0, 1.0);
   add("hash_keep", "Keep at Edits",
-      "Samples that a cell keeps when the scene changes, so that the image stays useful while it heals; 0: none", "",
-      int64_t(0), 0.0, 1e6);
+      "Samples that a cell's light of before an edit counts for at most; paths that are walked again say for how many "
+      "it "
+      "may, and by how much light changed. 0: an edit starts anew",
+      "", int64_t(kKeep), 0.0, 1e6);
   add("hash_memory", "Memory", "Most memory for cells; beyond, those without new samples for longest make room", "MiB",
       1024.0, 1.0, 1e6);
   add("hash_view", "View", "LIGHT, or what the cells hold: LEVEL, COUNT, AGE, SIDE", "", std::string("LIGHT"), 0.0,
       0.0);
   d.debug_views = {"LEVEL", "COUNT", "AGE", "SIDE"};
-  d.statistics = {"cells",         "cells_new",    "cells_evicted", "cells_refused", "cells_updated",
-                  "cache_samples", "cache_paths",  "cache_holes",   "cache_rays",    "cache_shadow_rays",
-                  "cache_dropped", "cache_resets", "cache_bytes",   "seconds_paths", "seconds_table"};
+  d.statistics = {
+      "cells",         "cells_new",         "cells_evicted", "cells_refused",     "cells_updated", "cache_samples",
+      "cache_paths",   "cache_holes",       "cache_rays",    "cache_shadow_rays", "cache_dropped", "cache_resets",
+      "cache_edits",   "cache_paths_again", "cache_ratio",   "cache_unexplained", "cache_bytes",   "cache_edit_bytes",
+      "seconds_edits", "seconds_paths",     "seconds_table"};
   return d;
 }
 

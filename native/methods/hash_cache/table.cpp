@@ -109,7 +109,7 @@ void Table::make_room(uint32_t p, size_t fresh, uint32_t stamp, TableCounts& cou
 }
 
 void Table::reduce(std::span<const Sample> samples, std::span<const KeyIndex> order, uint32_t stamp, uint32_t salt,
-                   uint32_t p, Reduced& out) {
+                   const Mend& mend, uint32_t p, Reduced& out) {
   std::vector<KeyIndex> sorted(order.begin(), order.end());
   std::sort(sorted.begin(), sorted.end());
   std::vector<uint64_t> keys;
@@ -141,12 +141,14 @@ void Table::reduce(std::span<const Sample> samples, std::span<const KeyIndex> or
       store.rest[size_t(&record - store.buckets.front().cells)] = uint32_t(keys[i] >> 32);
       store.used++;
       out.counts.added++;
+    } else if (mend) {
+      mend(record, out.cells[i].cell);
     }
     record.add(out.cells[i].light, out.cells[i].count, stamp, salt);
   }
 }
 
-uint64_t Table::add(std::vector<Sample> samples, uint32_t stamp, unsigned threads, StopToken stop) {
+uint64_t Table::add(std::vector<Sample> samples, uint32_t stamp, unsigned threads, StopToken stop, const Mend& mend) {
   // A level at a time, from the finest: what is reduced there is all that the next one needs.
   std::array<std::vector<Sample>, kTopLevel + 1> begins;
   for (const Sample& s : samples) begins[std::min<uint32_t>(s.cell.level, kTopLevel)].push_back(s);
@@ -164,7 +166,7 @@ uint64_t Table::add(std::vector<Sample> samples, uint32_t stamp, unsigned thread
     parallel_blocks(kParts, 8, threads, [&](size_t begin, size_t end) {
       for (size_t p = begin; p < end; ++p)
         if (first[p] < first[p + 1])
-          reduce(samples, std::span(order).subspan(first[p], first[p + 1] - first[p]), stamp, salt, uint32_t(p),
+          reduce(samples, std::span(order).subspan(first[p], first[p + 1] - first[p]), stamp, salt, mend, uint32_t(p),
                  reduced[p]);
     });
     std::array<size_t, kParts + 1> begin_of;
@@ -194,10 +196,9 @@ void Table::clear() {
   last_stamp_ = adds_ = 0;
 }
 
-void Table::forget(uint32_t most) {
-  for (Store& store : stores_)
-    for (Bucket& bucket : store.buckets)
-      for (Record& r : bucket.cells) r.set_count(std::min(r.count(), most));
+void Table::drop_older(uint32_t age, uint32_t stamp) {
+  for (uint32_t p = 0; p < kParts; ++p)
+    if (stores_[p].used) keep_younger(p, age, stamp);
 }
 
 size_t Table::size() const {

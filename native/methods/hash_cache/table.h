@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -64,17 +65,19 @@ struct TableCounts {
 class Table {
  public:
   static constexpr uint32_t kParts = 256;
+  using Mend = std::function<void(Record&, const Cell&)>;
   Table() = default;
   Table(const Table&) = delete;
   Table& operator=(const Table&) = delete;
   void clear();
-  /// No cell counts more than `most` samples from here on, so that new ones weigh more.
-  void forget(uint32_t most);
   /// Cells beyond this many bytes push out those that got no samples for the longest time; then new ones are refused.
   void set_limit(size_t bytes) { limit_ = bytes; }
   /// Adds the samples to their cells, those of every level sums of the level's below, up to kTopLevel. Returns the
   /// number of cells that were touched.
-  uint64_t add(std::vector<Sample> samples, uint32_t stamp, unsigned threads, StopToken stop);
+  /// `mend`, if any, is shown each cell that is there already before it takes its samples.
+  uint64_t add(std::vector<Sample> samples, uint32_t stamp, unsigned threads, StopToken stop, const Mend& mend = {});
+  /// Cells without a sample for more than `age` passes go.
+  void drop_older(uint32_t age, uint32_t stamp);
   const Record* find(const Cell& cell) const { return find(key_of(cell)); }
   /// Asks for the memory in which find(key) will look: for many keys at once, before the first is looked up.
   void prefetch(uint64_t key) const {
@@ -127,7 +130,7 @@ class Table {
     TableCounts counts;
   };
   void reduce(std::span<const Sample> samples, std::span<const std::pair<uint64_t, uint32_t>> order, uint32_t stamp,
-              uint32_t salt, uint32_t part, Reduced& out);
+              uint32_t salt, const Mend& mend, uint32_t part, Reduced& out);
   void make_room(uint32_t part, size_t fresh, uint32_t stamp, TableCounts&);
   size_t most_buckets() const { return std::max<size_t>(1, limit_ / (kParts * (sizeof(Bucket) + 16))); }
   size_t most_cells() const { return most_buckets() * kFullest / kOf; }

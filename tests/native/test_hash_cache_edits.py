@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Edits of a scene whose cells are full: the first picture after one is no worse than a fresh cache's, later ones are the
+new scene's, and what an edit cannot matter to stays as it was."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from afterglow.scenes import Camera, Description, Light, look_at, translate
+from afterglow.scenes.native import Built, graph
+from afterglow.scenes.rooms import diffuse
+from afterglow.scenes.shapes import join, quad, sphere
+from test_hash_cache import Live
+
+SIZE = 64
+SETTINGS: dict[str, Any] = dict(width=SIZE, height=SIZE, samples=1, hash_extra=0.0, hash_filter=False, diffuse_bounces=4)
+
+
+def open_room(x: float) -> Any:
+    """Two metres wide, open in front."""
+    a, b, y, z = x - 1, x + 1, 1.5, 2.0
+    return join(
+        quad((a, -y, 0), (b, -y, 0), (b, y, 0), (a, y, 0)), quad((a, y, z), (b, y, z), (b, -y, z), (a, -y, z)),
+        quad((a, y, 0), (b, y, 0), (b, y, z), (a, y, z)), quad((a, -y, 0), (a, y, 0), (a, y, z), (a, -y, z)),
+        quad((b, y, 0), (b, -y, 0), (b, -y, z), (b, y, z)))
+
+
+def two_rooms() -> Description:
+    """Side by side, a lamp in each, seen from the front. Sixteen balls stand in the left one; the right one is red."""
+    scene = Description("two rooms", Camera(look_at((0, -4.6, 1.4), (0, 0, 0.9)), math.radians(55)))
+    scene.materials.update(white=diffuse((0.7, 0.7, 0.7)), red=diffuse((0.7, 0.1, 0.1)), ball=diffuse((0.6, 0.6, 0.2)))
+    for name, x in (("Left", -1.1), ("Right", 1.1)):
+        scene.add(name, open_room(x), "red" if name == "Right" else "white")
+        scene.lights.append(Light(name, "point", translate((x, 0.2, 1.6)), 40.0, radius=0.1))
+    scene.lights.append(Light("Front", "point", translate((0, -4.0, 1.2)), 10.0, radius=0.1))
+    for i in range(16):
+        place = (-1.8 + 0.4 * (i % 4), -0.5 + 0.4 * (i // 4), 0.12)
+        scene.add(f"Ball{i}", sphere(0.12, 16, 8), "ball", transform=translate(place))
+    return scene
+
+
+def halve_both(b: Built) -> None:
+    for lamp in ("Left", "Right"):
+        b.scene.set_light(b.lights[lamp], power=20.0)
+
+
+def halve_one(b: Built) -> None:
+    b.scene.set_light(b.lights["Left"], power=20.0)
+
+
+def switch_off(b: Built) -> None:
+    b.scene.set_light(b.lights["Left"], power=0.0)
+
+
+def move_ball(b: Built) -> None:
+    b.scene.set_transforms(b.instances["Ball5"], translate((-0.5, -0.9, 0.12))[None])
+
+
+def recolour(b: Built) -> None:
+    b.scene.set_material(b.materials["red"], graph(diffuse((0.1, 0.2, 0.7))))
+
+
+def recolour_balls(b: Built) -> None:
+    b.scene.set_material(b.materials["ball"], graph(diffuse((0.1, 0.2, 0.7))))
+
+
+def move_lamp(b: Built) -> None:
+    b.scene.set_light(b.lights["Left"], transform=translate((-1.8, -0.6, 0.6)))
+
+
+EDITS = dict(halve_both=halve_both, halve_one=halve_one, switch_off=switch_off, move_ball=move_ball, recolour=recolour,
+             recolour_balls=recolour_balls, move_lamp=move_lamp)
+
+
+def run(edit: str, seeds: int, before: int, after: int, **settings: Any) -> tuple[np.ndarray, Live]:
+    """Pictures after an edit, [seed, picture, y, x, channel], of caches that `before` pictures of the old scene had filled (0: of
+    fresh ones of the new scene)."""
+    pictures = []
+    for s in range(seeds):
+        live = Live(two_rooms(), start=False, **{**SETTINGS, **settings})
+        for i in range(before):
+            live.run(seed=1000 * s + 500 + i)
+        live.session.update(dict(seed=1000 * s))
+        if not before:
+            EDITS[edit](live.built)
+            live.built.scene.commit()
+            pictures.append([live.run(seed=1000 * s)])
+        else:
+            pictures.append([live.edit(lambda live=live: EDITS[edit](live.built))])
+        pictures[-1] += [live.run(seed=1000 * s + 1 + i) for i in range(after - 1)]
+    return np.array(pictures, np.float64), live
+
+
+@functools.cache
+def truth(edit: str) -> tuple[np.ndarray, np.ndarray]:
+    """What a fresh cache converges to, and the pixels that no edge of an object makes noisy."""
+    pictures = run(edit, 1, 0, 120)[0][0, 30:]
+    mean = pictures.mean(0)
+    return mean, (pictures.std(0) < 0.35 * mean + 1e-3).all(-1)
+
+
+def error(pictures: np.ndarray, edit: str) -> float:
+    """relMSE with the worst 0.1 % of each picture's pixels left out, a mean over pictures."""
+    reference, still = truth(edit)
+    exposure = 0.5 / reference.mean()
+    off = (exposure**2 * (pictures - reference) ** 2 / ((exposure * reference) ** 2 + 0.01)).mean(-1)[..., still]
+    off.sort()
+    return float(off[..., :-max(1, off.shape[-1] // 1000)].mean())
+
+
+@pytest.mark.parametrize(("edit", "first"), [("halve_both", 0.7), ("halve_one", 0.9), ("switch_off", 1.0), ("move_ball", 0.9),
+                                             ("recolour", 1.0), ("recolour_balls", 0.8), ("move_lamp", 1.0)])
+def test_the_first_picture_after_an_edit_is_no_worse_than_a_fresh_caches(edit: str, first: float) -> None:
+    """Much better where the edit touches little, or where light changes by one factor; the ninth picture is no worse, either."""
+    fresh, edited = run(edit, 3, 0, 9)[0], run(edit, 3, 16, 9)[0]
+    ratios = [error(edited[:, i], edit) / error(fresh[:, i], edit) for i in (0, 8)]
+    print(edit, *(f"{r:.2f}" for r in ratios))
+    assert ratios[0] < first and ratios[1] < 1.05, ratios
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edit", ["halve_one", "move_ball", "move_lamp"])
+def test_old_light_fades(edit: str) -> None:
+    """After 64 pictures a cache that lived through the edit has a fresh one's mean within 1 % in either half of the picture, and
+    is at most half as far from it as at first."""
+    fresh, edited = run(edit, 4, 0, 72)[0], run(edit, 4, 16, 72)[0]
+    for columns in (slice(0, SIZE // 2), slice(SIZE // 2, SIZE)):
+        off, noise = [], []
+        for pictures in (slice(0, 8), slice(64, 72)):
+            a, b = (p[:, pictures, :, columns].mean((1, 2, 3, 4)) for p in (fresh, edited))
+            off.append(abs(b.mean() / a.mean() - 1))
+            noise.append(math.hypot(a.std(ddof=1), b.std(ddof=1)) / len(a) ** 0.5 / a.mean())
+        assert off[1] < 0.01 + 3 * noise[1] and off[1] < 0.5 * off[0] + 3 * noise[1], (off, noise)
+
+
+def test_an_edit_far_away_costs_nothing() -> None:
+    """What the paths say: none brings other light. The pictures go on as if nothing had been."""
+    pictures = []
+    for hidden in (False, True):
+        description = two_rooms()
+        description.materials["hidden"] = diffuse((0.5, 0.5, 0.5))
+        description.add("Hidden", sphere(0.1, 8, 4), "hidden", transform=translate((0, 8, 0)))
+        live = Live(description, start=False, **SETTINGS)
+        for i in range(12):
+            live.run(seed=i)
+        live.session.update(dict(seed=50))
+        if hidden:
+            live.edit(lambda live=live: live.built.scene.set_transforms(live.built.instances["Hidden"], translate((0, 9, 0))[None]))
+            assert live.number("cache_resets") == 1 and live.number("cache_edits") == 1
+            assert live.number("cache_ratio") == 1.0 and live.number("cache_unexplained") < 1e-3
+        else:
+            live.run(seed=50)
+        pictures.append(np.array([live.run(seed=60 + i) for i in range(4)], np.float64))
+    noise = np.abs(pictures[0][0] - pictures[0][1]).mean()
+    assert np.abs(pictures[1] - pictures[0]).mean() < 0.05 * noise
+
+
+def test_edits_give_the_same_image_on_any_number_of_threads() -> None:
+    images = [run("halve_one", 1, 4, 3, threads=threads)[0] for threads in (1, 2)]
+    assert np.array_equal(images[0], images[1])
+
+
+def test_edits_faster_than_pictures() -> None:
+    """Updates that are stopped before the paths were walked again lose nothing and keep nothing wrong."""
+    live = Live(two_rooms(), start=False, **SETTINGS)
+    for i in range(12):
+        live.run(seed=i)
+    for power in (30.0, 10.0, 5.0, 25.0, 20.0):
+        with live.session.edit():
+            live.built.scene.set_light(live.built.lights["Left"], power=power)
+            live.built.scene.commit()
+    live.session.wait()
+    assert live.number("cache_resets") == 1
+    pictures = np.array([live.run(seed=100 + i) for i in range(9)], np.float64)
+    assert error(pictures[8:], "halve_one") < 1.2 * error(run("halve_one", 1, 0, 10)[0][:, 9:], "halve_one")
+
+
+def test_objects_leave_and_come_back() -> None:
+    """Their cells forget; new objects that take a removed one's place know nothing of it."""
+    live = Live(two_rooms(), start=False, **SETTINGS)
+    for i in range(8):
+        live.run(seed=i)
+    ball, scene = live.built.instances["Ball5"], live.built.scene
+    for place in ((0, 9, 0), (-1.4, -0.1, 0.12)) * 3:
+        image = live.edit(lambda place=place: scene.set_transforms(ball, translate(place)[None]))
+        assert np.isfinite(image).all() and (image >= 0).all()
+    pictures = np.array([live.run(seed=100 + i) for i in range(8)], np.float64)
+    fresh = Live(two_rooms(), start=False, **SETTINGS)
+    expected = np.array([fresh.run(seed=200 + i) for i in range(16)], np.float64)[8:]
+    assert live.number("cache_resets") == 1
+    assert abs(pictures.mean() / expected.mean() - 1) < 0.02
+
+
+def test_nothing_is_kept_where_the_setting_says_so() -> None:
+    _, live = run("halve_both", 1, 2, 1, hash_keep=0)
+    assert live.number("cache_resets") == 2 and live.number("cache_edits") == 0
+
+
+def test_a_cache_that_is_saved_after_an_edit_holds_no_old_light(tmp_path: Any) -> None:
+    _, live = run("halve_both", 1, 8, 1)
+    path = str(tmp_path / "cells")
+    live.session.save_cache(path)
+    cells = live.number("cells")
+    live.session.load_cache(path)
+    image = live.run(seed=77)
+    assert live.number("cells") <= 1.1 * cells
+    assert abs(image.mean() / truth("halve_both")[0].mean() - 1) < 0.1
