@@ -195,6 +195,21 @@ def test_objects_leave_and_come_back() -> None:
     assert abs(pictures.mean() / expected.mean() - 1) < 0.02
 
 
+def test_a_lamp_that_switches_with_every_frame() -> None:
+    """Each state's pictures stay as good as those of caches that begin anew with every frame."""
+    errors: dict[int, list[float]] = {}
+    for keep in (0, 1000000):
+        live = Live(two_rooms(), start=False, hash_keep=keep, **SETTINGS)
+        live.run(seed=0)
+        for frame in range(16):
+            power = 0.0 if frame % 2 else 40.0
+            live.session.update(dict(seed=10 + frame))
+            image = live.edit(lambda live=live, power=power: live.built.scene.set_light(live.built.lights["Left"], power=power))
+            if frame % 2:
+                errors.setdefault(keep, []).append(error(image[None].astype(np.float64), "switch_off"))
+    assert np.mean(errors[1000000]) < 1.1 * np.mean(errors[0]), errors
+
+
 def test_nothing_is_kept_where_the_setting_says_so() -> None:
     _, live = run("halve_both", 1, 2, 1, hash_keep=0)
     assert live.number("cache_resets") == 2 and live.number("cache_edits") == 0

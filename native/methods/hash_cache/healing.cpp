@@ -85,10 +85,11 @@ void find_change(Sums& s, const Change& larger, std::span<const Rgb> before, std
 
 }  // namespace
 
-uint32_t samples_worth(float doubt) {
-  const float most = doubt > kCertain ? kMostDoubtful : float(Record::kMostSamples);
-  const float worth = std::min(kWorth / std::max(doubt, 1e-12f), most);
-  return worth < kLeast ? 0u : uint32_t(worth);
+uint32_t samples_worth(uint32_t samples, float doubt) {
+  if (!samples) return 0;
+  const float worth = 1.0f / (1.0f / float(samples) + std::max(doubt, 0.0f) / kWorth);
+  if (doubt <= kCertain) return uint32_t(std::ceil(worth));
+  return worth < kLeast ? 0u : uint32_t(std::min(worth, kMostDoubtful));
 }
 
 void Healing::clear() {
@@ -199,7 +200,7 @@ Known Healing::mended(const Record& r, const Cell& cell) const {
     if (std::binary_search(edit->forgotten.begin(), edit->forgotten.end(), owner / 8u)) return {};
     const Change change = change_at(*edit, place);
     k.light = glm::min(k.light * change.ratio, Rgb(1e30f));
-    k.count = std::min({k.count, samples_worth(change.doubt), edit->most});
+    k.count = std::min(samples_worth(k.count, change.doubt), edit->most);
   }
   return k;
 }

@@ -33,8 +33,8 @@ struct Change {
   Rgb spread{0.5f};          // squared residuals over squared light, of single paths
   float doubt = 1.0f;        // the unexplained share's expected square, its own error included
 };
-/// How many samples old light counts for: so many that its being wrong weighs no more than their noise. 0: none.
-uint32_t samples_worth(float doubt);
+/// How many of its samples old light counts for: its noise and the doubt of every edit since add up. 0: none.
+uint32_t samples_worth(uint32_t samples, float doubt);
 
 /// A cell's light and samples, as far as they hold in the scene as it is.
 struct Known {
