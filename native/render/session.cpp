@@ -159,7 +159,7 @@ SessionProgress Session::progress() const {
   if (film_) {
     const FilmSettings& f = film_->settings();
     const double pixels = double(f.x1 - f.x0) * double(f.y1 - f.y0);
-    p.fraction = std::min(1.0, double(done) / std::max(1.0, pixels * shown_settings_.samples));
+    p.fraction = std::min(1.0, double(done) / std::max(1.0, pixels * shown_settings_.samples * (1.0 + extra_)));
     if (shown_settings_.accuracy > 0.0f && p.noise > 0.0)  // its square falls with the samples
       p.fraction = std::max(p.fraction, std::min(1.0, std::pow(shown_settings_.accuracy / p.noise, 2.0)));
     if (shown_settings_.time_limit > 0.0f)

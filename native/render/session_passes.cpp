@@ -91,6 +91,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
   {
     const std::lock_guard lock(mutex_);
     statistics_.seconds["prepare"] = now() - begun;
+    extra_ = renderer.extra();
     stage_ = "rendering";
   }
   if (renderer.extra() > 0.0f) film.keep_noise();

@@ -272,7 +272,7 @@ void finish(std::span<const PixelRequest> requests, Film& film, Wavefront& wave,
           }
           ++pixel;
         }
-      if (work.samples_done && !request.extra) *work.samples_done += sample_count(request);
+      if (work.samples_done) *work.samples_done += sample_count(request);
     }
   });
   times.dropped += dropped;

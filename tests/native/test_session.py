@@ -331,6 +331,25 @@ def test_a_viewport_starts_as_coarse_as_the_machine_needs_and_ends_with_the_same
     np.testing.assert_array_equal(*pictures)
 
 
+@pytest.mark.parametrize("method", ["PATH_TRACING", "INSTANT_CACHE", "HASH_CACHE"])
+def test_progress_tells_of_one_long_pass_and_cancel_is_obeyed_in_it(method: str) -> None:
+    """Filling a cache and further camera samples are parts of the way: nothing stands at its end for long."""
+    _, s = session(method=method, samples=1, width=1200, height=900)
+    s.start()
+    seen = []
+    while not s.wait(0.005):
+        seen.append(s.progress()["fraction"])
+    assert seen == sorted(seen) and len(set(seen)) >= 4, seen
+    assert sum(fraction > 0.99 for fraction in seen) <= 0.25 * len(seen), seen
+    s.update({"samples": 1000})
+    s.start()
+    time.sleep(0.2)
+    before = time.perf_counter()
+    s.cancel()
+    assert s.progress()["state"] == "cancelled"
+    assert time.perf_counter() - before < 0.1 + 0.2 * machine_is_loaded()
+
+
 @pytest.mark.parametrize("method", ["INSTANT_RADIOSITY", "INSTANT_CACHE", "HASH_CACHE"])
 def test_methods_with_a_bias_tell_noise_and_believe_no_error(method: str) -> None:
     _, s = session(method=method, samples=32, width=24, height=24)
