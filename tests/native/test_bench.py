@@ -102,7 +102,7 @@ def test_charts_of_the_hash_cache_are_drawn_from_what_was_measured() -> None:
                {"figure": "reconstruction's time over that with the fewest caching paths", "details": {"settings": {"3": rows}}},
                {"figure": "density of occupied cells at 256³", "details": {"table": table}}, {"figure": "other", "details": {}}]
     made = charts(figures)
-    assert set(made) == {f"hash_cache_{n}.svg" for n in ("errors", "similarity", "caching", "updated", "density", "memory")}
+    assert set(made) == {f"hash_cache_{n}.svg" for n in ("relmse", "ms_ssim", "caching", "updated", "density", "memory")}
     assert all(text.startswith("<svg") and text.count("<polyline") == 2 for name, text in made.items() if "updated" not in name)
     assert charts(figures[-1:]) == {}
 

@@ -23,7 +23,7 @@ def points(values: Mapping[str, float]) -> list[tuple[float, float]]:
 def quality(path: Details | None, single: Details | None) -> dict[str, str]:
     """Figure 11: relMSE and MS-SSIM over samples a pixel."""
     charts = {}
-    for kind, name, log in (("errors", "relMSE", True), ("similarity", "MS-SSIM", False)):
+    for kind, name, file, log in (("errors", "relMSE", "relmse", True), ("similarity", "MS-SSIM", "ms_ssim", False)):
         lines = []
         for details, ours, theirs in ((single, "HashCache, first frame", "path tracing, first frame"),
                                       (path, "HashCache, camera path", "path tracing, camera path")):
@@ -31,7 +31,7 @@ def quality(path: Details | None, single: Details | None) -> dict[str, str]:
                 lines += [chart.Line(ours, points(details[kind])), chart.Line(theirs, points(details["path_tracing"][kind]))]
         if lines:
             shown = [chart.Line(line.name, [(x, 1 - y) for x, y in line.points]) if not log else line for line in lines]
-            charts[f"hash_cache_{kind}.svg"] = chart.lines(
+            charts[f"hash_cache_{file}.svg"] = chart.lines(
                 f"Country Kitchen, {name} by samples a pixel", shown, "samples a pixel", name if log else "1 − MS-SSIM")
     return charts
 
