@@ -149,7 +149,8 @@ def test_an_edit_far_away_costs_nothing() -> None:
             live.run(seed=i)
         live.session.update(dict(seed=50))
         if hidden:
-            live.edit(lambda live=live: live.built.scene.set_transforms(live.built.instances["Hidden"], translate((0, 9, 0))[None]))
+            away = translate((0, 9, 0))[None]
+            live.edit(lambda live=live, away=away: live.built.scene.set_transforms(live.built.instances["Hidden"], away))
             assert live.number("cache_resets") == 1 and live.number("cache_edits") == 1
             assert live.number("cache_ratio") == 1.0 and live.number("cache_unexplained") < 1e-3
         else:
