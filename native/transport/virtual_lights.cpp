@@ -91,26 +91,26 @@ class LightPath {
   static uint32_t beginnings(const LightImportance* importance) { return importance ? kFarBeginnings : kBeginnings; }
 
  private:
-  /// From the emitter to the first diffuse surface. False: the path ends there.
-  bool begin(const PathPoint& at, VirtualLight& light) {
+  /// From the emitter to the first diffuse surface, where it leaves a light, if there is one.
+  void begin(const PathPoint& at, VirtualLight& light) {
     Sampler sampler(at.seed, at.index);
     const float u_choice = sampler.next1();
     const Vec2 place = sampler.next2(), way = sampler.next2();
-    if (!emission_.sample(u_choice, place, way, from_)) return false;
+    if (!emission_.sample(u_choice, place, way, from_)) return;
     first_ = true;
     shadowless_ = emission_.shadowless(from_);
     guided_ = importance_ && from_.beam > 0.0f && !shadowless_;
     passes_ = 0.0f;
-    if (guided_ && unit_float(hash(at.seed, at.index, 0x1a7u)) >= kWhole && !aim(at)) return false;
+    if (guided_ && unit_float(hash(at.seed, at.index, 0x1a7u)) >= kWhole && !aim(at)) return;
     ray_ = from_.ray;
     context_ = PathContext{};
     context_.kind = PathContext::kDiffuse | PathContext::kReflection;
     context_.drop_glossy = !walk_.limits.caustics_reflective;
     context_.drop_refractive = !walk_.limits.caustics_refractive;
     throughput_ = Rgb(1.0f);
-    if (shadowless_ && !enter(unit_float(hash(at.seed, at.index, 0x5adu)))) return false;
+    if (shadowless_ && !enter(unit_float(hash(at.seed, at.index, 0x5adu)))) return;
     sampler.set_dimension(kStartDimensions);
-    return next_light(sampler, 1.0f / float(plan_.paths[0]), light);
+    next_light(sampler, 1.0f / float(plan_.paths[0]), light);
   }
 
   /// Light of a lamp without shadows reaches every surface on its way: one of them is chosen, for all.
@@ -199,14 +199,14 @@ class LightPath {
     vertex_ = other.vertex_;
   }
 
-  /// Goes on to the next surface with a diffuse lobe and leaves a light there. False: the path ended.
-  bool next_light(Sampler& sampler, float share, VirtualLight& light) {
+  /// Goes on to the next surface with a diffuse lobe and leaves a light there, unless the path ends.
+  void next_light(Sampler& sampler, float share, VirtualLight& light) {
     const float u_lobe = sampler.next1(), u_straight = sampler.next1();
     const Vec2 u = sampler.next2();
     for (int passage = 0; passage < kMostPassages; ++passage) {
       Hit hit;
       counts_.bounce++;
-      if (!walk_.scene.rays.closest(ray_, hit)) return false;
+      if (!walk_.scene.rays.closest(ray_, hit)) return;
       SurfacePoint point = surface_point(walk_.scene.scene, ray_, hit, walk_.with_uv);
       if (!walk_.with_uv && walk_.scene.materials.reads_uv(point.material))
         point.uv = surface_uv(walk_.scene.scene, point);
@@ -224,18 +224,17 @@ class LightPath {
         go_straight(point);
         continue;
       }
-      if (!weigh(point.position)) return false;
+      if (!weigh(point.position)) return;
       const Shares shares = take_diffuse(surface);
       const bool has_diffuse = !is_black(shares.front) || !is_black(shares.back);
       if (!has_diffuse) {
-        if (reached || !bounce_on(surface, point, std::fmod(u_lobe + turned, 1.0f), u)) return false;
+        if (reached || !bounce_on(surface, point, std::fmod(u_lobe + turned, 1.0f), u)) return;
         continue;
       }
       leave_light(point, shares, share, light);
       vertex_ = {surface, shares, point, throughput_, context_};  // its ways are chosen later
-      return true;
+      return;
     }
-    return false;
   }
 
   void start(const SurfacePoint& point) {

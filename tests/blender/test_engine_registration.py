@@ -110,9 +110,9 @@ def test_a_click_prepares_an_animation(in_blender: Run) -> None:
         s.render.engine = 'AFTERGLOW'
         own = s.afterglow
         own.max_bounces = 7
-        bpy.ops.afterglow.animation(moves='CAMERA')
+        bpy.ops.afterglow.quality(quality='CAMERA')
         result(camera=[own.method, own.samples, own.hash_cache.hash_extra, s.render.use_persistent_data, own.max_bounces])
-        bpy.ops.afterglow.animation(moves='OBJECTS')
+        bpy.ops.afterglow.quality(quality='OBJECTS')
         result(objects=[own.method, own.accuracy, own.instant_cache.virtual_lights, own.instant_cache.light_compensation])
         """
     )

@@ -118,7 +118,6 @@ def test_the_first_picture_after_an_edit_is_no_worse_than_a_fresh_caches(edit: s
     """Much better where the edit touches little, or where light changes by one factor; the ninth picture is no worse, either."""
     fresh, edited = run(edit, 3, 0, 9)[0], run(edit, 3, 16, 9)[0]
     ratios = [error(edited[:, i], edit) / error(fresh[:, i], edit) for i in (0, 8)]
-    print(edit, *(f"{r:.2f}" for r in ratios))
     assert ratios[0] < first and ratios[1] < 1.05, ratios
 
 

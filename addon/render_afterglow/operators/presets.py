@@ -14,24 +14,23 @@ QUALITIES = {
     "REFERENCE": dict(
         accuracy=0.005, samples=1 << 20, preview_accuracy=0.01, sample_clamp_direct=0.0, sample_clamp_indirect=0.0
     ),
-}
-# What moves → settings of an animation whose caches live from frame to frame: as the bench's figures `frames` have them.
-ANIMATIONS = {
-    "CAMERA": dict(method="HASH_CACHE", accuracy=0.0, samples=2, denoise=True, hash_cache=dict(hash_extra=2.5)),
+    # Animations whose caches live from frame to frame: as the bench's figures `frames` have them.
+    "CAMERA": dict(
+        method="HASH_CACHE", accuracy=0.0, samples=2, denoise=True, use_animated_seed=True, hash_cache=dict(hash_extra=2.5)
+    ),
     "OBJECTS": dict(
-        method="INSTANT_CACHE", accuracy=0.0, samples=6, denoise=True,
+        method="INSTANT_CACHE", accuracy=0.0, samples=6, denoise=True, use_animated_seed=True,
         instant_cache=dict(virtual_lights=512, light_compensation=32, light_bound=4.0),
     ),
 }
-ANIMATION_ITEMS = [
-    ("CAMERA", "Camera Moves", "HashCache, denoised, with persistent data: what one frame found serves all that follow", 0),
-    ("OBJECTS", "Objects Move", "Instant cache, denoised, with persistent data: each frame repairs what the last one knew", 1),
-]
+ANIMATIONS = {"CAMERA", "OBJECTS"}  # they want persistent data
 QUALITY_ITEMS = [
     ("DRAFT", "Draft", "Relative error of 20 %, 64 samples at most", 0),
     ("MEDIUM", "Medium", "Relative error of 5 %, 1024 samples at most", 1),
     ("HIGH", "High", "Relative error of 2 %, 8192 samples at most", 2),
     ("REFERENCE", "Reference", "Relative error of 0.5 %, nothing clamped: slow", 3),
+    ("CAMERA", "Camera Moves", "HashCache, denoised, with persistent data: what one frame found serves all that follow", 4),
+    ("OBJECTS", "Objects Move", "Instant cache, denoised, with persistent data: each frame repairs what the last one knew", 5),
 ]
 # Settings that Cycles has by the same name and in the same meaning.
 FROM_CYCLES = (
@@ -51,7 +50,7 @@ FROM_CYCLES = (
 class AFTERGLOW_OT_quality(bpy.types.Operator):
     bl_idname = "afterglow.quality"
     bl_label = "Quality"
-    bl_description = "Set accuracy and samples for a quality"
+    bl_description = "Set method, accuracy and samples for a quality or an animation"
     bl_options = {"REGISTER", "UNDO"}
 
     quality: bpy.props.EnumProperty(name="Quality", items=QUALITY_ITEMS, default="MEDIUM")
@@ -61,33 +60,15 @@ class AFTERGLOW_OT_quality(bpy.types.Operator):
         return next(item[2] for item in QUALITY_ITEMS if item[0] == properties.quality)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for name, value in QUALITIES[self.quality].items():
-            setattr(context.scene.afterglow, name, value)
-        return {"FINISHED"}
-
-
-class AFTERGLOW_OT_animation(bpy.types.Operator):
-    bl_idname = "afterglow.animation"
-    bl_label = "Animation"
-    bl_description = "Set method, samples and persistent data for an animation"
-    bl_options = {"REGISTER", "UNDO"}
-
-    moves: bpy.props.EnumProperty(name="Moves", items=ANIMATION_ITEMS, default="OBJECTS")
-
-    @classmethod
-    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return next(item[2] for item in ANIMATION_ITEMS if item[0] == properties.moves)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
         own = context.scene.afterglow
-        for name, value in ANIMATIONS[self.moves].items():
+        for name, value in QUALITIES[self.quality].items():
             if isinstance(value, dict):
                 for inner, setting in value.items():
                     setattr(getattr(own, name), inner, setting)
             elif name != "denoise" or not own.poll_denoise():
                 setattr(own, name, value)
-        own.use_animated_seed = True
-        context.scene.render.use_persistent_data = True
+        if self.quality in ANIMATIONS:
+            context.scene.render.use_persistent_data = True
         return {"FINISHED"}
 
 
@@ -137,4 +118,4 @@ class AFTERGLOW_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):
     ]
 
 
-classes = (AFTERGLOW_OT_quality, AFTERGLOW_OT_animation, AFTERGLOW_OT_copy_cycles_settings, AFTERGLOW_OT_sampling_preset_add)
+classes = (AFTERGLOW_OT_quality, AFTERGLOW_OT_copy_cycles_settings, AFTERGLOW_OT_sampling_preset_add)

@@ -7,7 +7,7 @@ from bl_ui.utils import PresetPanel
 
 from .. import backend, store
 from ..operators import accuracy
-from ..operators.presets import ANIMATION_ITEMS, QUALITY_ITEMS
+from ..operators.presets import QUALITY_ITEMS
 from ..properties import methods
 from .panel import PropertiesPanel, wrap
 
@@ -34,8 +34,6 @@ class AFTERGLOW_RENDER_PT_sampling(PropertiesPanel, bpy.types.Panel):
         grid = layout.grid_flow(columns=2, align=True, row_major=True)
         for identifier, label, _description, _number in QUALITY_ITEMS:
             grid.operator("afterglow.quality", text=label).quality = identifier
-        for identifier, label, _description, _number in ANIMATION_ITEMS:
-            grid.operator("afterglow.animation", text=label).moves = identifier
         layout.operator("afterglow.copy_cycles_settings")
 
 
