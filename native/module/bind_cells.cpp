@@ -3,6 +3,7 @@
 // the table's keep, keys, and the speed of look-ups.
 #include <shared_mutex>
 
+#include "methods/hash_cache/cuckoo.h"
 #include "methods/hash_cache/measure.h"
 #include "methods/hash_cache/occupied.h"
 #include "module/queries.h"
@@ -12,6 +13,7 @@ namespace afterglow {
 namespace {
 
 using Points = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Keys = py::array_t<uint32_t, py::array::c_style | py::array::forcecast>;
 
 Vec3 relative(const double* p, const DVec3& origin) { return Vec3(DVec3(p[0], p[1], p[2]) - origin); }
 
@@ -65,6 +67,24 @@ py::dict occupied_cells(const PyScene& self, int levels, const py::handle& point
   out["index"] = index, out["light"] = kept;
   out["peak_bytes"] = occupied.peak_bytes();
   out["seconds_mark"] = occupied.seconds_mark(), out["seconds_maps"] = occupied.seconds_maps();
+  return out;
+}
+
+/// The paper's map over these keys, with so many slots for each at first: what it answers for `asked` (the key's place
+/// among the keys, or -1), and how often it was built anew.
+py::dict cuckoo_map(const Keys& keys, double usage, const Keys& asked) {
+  if (!(usage > 0.0 && usage < 100.0)) throw InvalidInput("cuckoo_map: usage must be above 0 and below 100");
+  std::vector<hash_cache::Block> blocks(size_t(keys.size()));
+  for (size_t i = 0; i < blocks.size(); ++i) blocks[i] = {{1u, uint32_t(i)}, keys.data()[i]};
+  hash_cache::CuckooMap map;
+  map.build(blocks, usage);
+  py::list found;
+  for (py::ssize_t i = 0; i < asked.size(); ++i) {
+    const hash_cache::BlockCells* block = map.find(asked.data()[i]);
+    found.append(block ? int64_t(block->first) : int64_t(-1));
+  }
+  py::dict out;
+  out["found"] = found, out["attempts"] = map.attempts(), out["bytes"] = map.bytes();
   return out;
 }
 
@@ -136,6 +156,7 @@ void bind_cells(py::module_& m) {
         py::arg("points") = py::array_t<double>(std::vector<py::ssize_t>{0, 3}), py::arg("threads") = 0,
         py::arg("normals") = py::array_t<double>(std::vector<py::ssize_t>{0, 3}),
         py::arg("light") = py::array_t<double>(std::vector<py::ssize_t>{0, 3}));
+  m.def("cuckoo_map", &cuckoo_map, py::arg("keys"), py::arg("usage"), py::arg("asked"));
   m.def("measure_lookups", &measure_lookups, py::arg("cells"), py::arg("lookups"));
   m.def("cell_keys", &cell_keys, py::arg("cells"));
   m.def("updated_cell", &updated_cell, py::arg("light"), py::arg("count"), py::arg("sums"), py::arg("samples") = 1);

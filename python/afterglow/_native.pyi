@@ -301,6 +301,9 @@ def both_sides(normals: NDArray[np.float64], sums: NDArray[np.float64], samples:
                changed: int = 0) -> dict[str, Any]:
     """A cell of that structure after so many updates, each a sum of samples that come to the side of a normal in a frame, the
     scene having changed in frame `changed`: front, back, counts of both, normal, frame, bytes."""
+def cuckoo_map(keys: NDArray[np.uint32], usage: float, asked: NDArray[np.uint32]) -> dict[str, Any]:
+    """The paper's map over keys that differ, with `usage` slots for each at first: found, the place of each asked key among the
+    keys (-1: none); attempts, how often it was built; bytes."""
 def measure_lookups(cells: int, lookups: int) -> dict[str, float]:
     """Look-ups a second on one thread among so many cells of the HashCache, each of which reads the cell's light: in the table
     of cells that are made when needed, in the paper's map over occupied cells (data included), and bare random reads of the

@@ -113,6 +113,24 @@ def test_nothing_and_wrong_input() -> None:
         _native.occupied_cells(scene, 13, np.zeros((0, 3)))
 
 
+@pytest.mark.parametrize("usage", [0.25, 0.9, 1.1])
+def test_a_map_that_is_too_small_grows_until_all_fit(usage: float) -> None:
+    """Insertions fail first: each failure takes other hash functions and one per cent more slots. None is lost or mistaken."""
+    rng = np.random.default_rng(5)
+    keys = rng.choice(2**30, 5000, replace=False).astype(np.uint32)
+    others = np.setdiff1d(rng.choice(2**30, 5000).astype(np.uint32), keys)
+    found = _native.cuckoo_map(keys, usage, np.concatenate([keys, others]))
+    assert found["found"] == list(range(len(keys))) + [-1] * len(others)
+    assert found["attempts"] > 1 if usage < 1 else found["attempts"] == 1
+    slots = found["bytes"] / 12
+    assert len(keys) < slots < 1.12 * len(keys)
+
+
+def test_maps_of_few_and_of_neighbouring_keys() -> None:
+    for keys in ([], [0], list(range(17)), [2**32 - 2 - i for i in range(100)], list(range(0, 2**20, 2**12))):
+        assert _native.cuckoo_map(keys, 1.1, [*keys, 2**31])["found"] == [*range(len(keys)), -1]
+
+
 def test_look_ups_are_measured() -> None:
     speeds = _native.measure_lookups(20_000, 50_000)
     assert min(speeds[name] for name in ("table", "map", "reads")) > 1e4

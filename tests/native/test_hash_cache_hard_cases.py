@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from afterglow.scenes import Camera, Description, Light, look_at, scale, translate
-from afterglow.scenes.native import Built
 from afterglow.scenes.rooms import cornell_box, diffuse, emission
 from afterglow.scenes.shapes import box, quad, sphere
-from hard_cases import agree, mean, render
+from hard_cases import Mean, agree, mean, render
 from test_hash_cache import Live
 
 HASH: dict[str, Any] = dict(method="HASH_CACHE", size=16, samples=16, diffuse_bounces=4, max_bounces=12)
@@ -30,7 +29,7 @@ def room(transform: Any = None, power: float = 1.0) -> Description:
     return scene
 
 
-@pytest.mark.parametrize("size", [1e-4, 1e4])
+@pytest.mark.parametrize("size", [1e-4, 1e4, 1e6])
 def test_size_does_not_matter(size: float) -> None:
     whole = scale((size,) * 3)
     scaled = room(whole)
@@ -48,13 +47,22 @@ def test_brightness_does_not_matter() -> None:
     assert np.allclose(bright / 2.0**14, plain, rtol=1e-4)
 
 
+CORNER = (0.3137, 0.2741, 0.3459)  # of the grid, in radii from its centre: cells.h
+RADIUS = 8.0  # of the grid that a cube of eight metres gets
+
+
 def test_walls_on_borders_of_cells() -> None:
-    """Wherever the room stands in the grid, a border included, the light is the same."""
+    """Wherever the room stands in the grid, a border included, the light is the same, and so is its noise."""
     truth = mean(room(), **TRUE)
-    for shift in (0.0, 2.0**-9, 2.0**-7 * 0.3137, 0.2741):
-        scene = room(translate((shift, shift, shift)))
+    border = [math.ceil((1 + RADIUS * c) * 4) / 4 - 1 - RADIUS * c for c in CORNER]  # x, y, z = 1 lie on borders, all levels' to 25 cm
+    noise = []
+    for shift in ([0.0] * 3, [0.2741] * 3, border, [b + 1e-6 for b in border], [b - 1e-6 for b in border]):
+        scene = room(translate(shift))
         scene.add("Far", box((-4, -4, -4), (4, 4, 4), inward=True), "white")  # holds the grid where it is
+        found = [render(scene, seed=s, passes=["diffuse_indirect"], **HASH).passes["diffuse_indirect"] for s in range(4)]
         agree(mean(scene, **HASH), truth, tolerance=0.01)
+        noise.append(float(np.median(np.std(found, axis=0, ddof=1))))
+    assert max(noise[2:]) < 1.3 * max(noise[:2]), noise
 
 
 def test_large_and_small_triangles() -> None:
@@ -95,11 +103,41 @@ def test_a_lamp_that_switches_with_every_frame() -> None:
     assert abs(image.mean() / bright - 1) < 0.3
 
 
-def test_scene_grows_far_beyond_its_first_bounds() -> None:
-    live = Live(room(), samples=4, hash_keep=4)
-    ball = live.built.instances["Ball"]
-    for away in (1e2, 1e5):
-        live.edit(lambda away=away: live.built.scene.set_transforms(ball, translate((away, 0, 0))[None]))
-        assert np.isfinite(live.session.read("diffuse_indirect")).all()
-    truth = render(Built(live.built.description).scene, **TRUE).image  # no crash with a fresh one, either
-    assert np.isfinite(truth).all()
+@pytest.mark.parametrize("place", [scale((10.0,) * 3), scale((1e5,) * 3), scale((1e-5,) * 3), translate((3e4, 0, 0))],
+                         ids=["grows", "grows much", "shrinks", "leaves"])
+def test_scene_grows_far_beyond_its_first_bounds(place: np.ndarray) -> None:
+    """Or shrinks, or is somewhere else at once: the grid of the old one is of no use, and the picture is as a fresh cache's."""
+    settings: dict[str, Any] = dict(start=False, samples=8, hash_extra=0.0)
+    live, fresh, other = (Live(room(), **settings) for _ in range(3))
+    live.run()
+    with live.session.edit():
+        for item in live.built.description.objects:
+            live.built.scene.set_transforms(live.built.instances[item.name], (place @ item.at(0)[0])[None])
+        seen = look_at((0, -0.8, 0), (0, 1, 0))
+        moved = place @ seen
+        moved[:3, :3] = seen[:3, :3]
+        size = float(np.linalg.norm(place[:3, 0]))
+        live.built.description.camera.transform, live.built.description.camera.clip = moved, (0.01 * size, 1000.0 * size)
+        live.built.set_camera((32, 32), 0)
+        live.built.scene.commit()
+    live.session.wait()
+    fresh.run()
+    truth = np.mean([other.run(seed=500 + i) for i in range(24)][8:], axis=0)
+    errors = [float(np.median([np.abs(v.run(seed=100 + i) - truth) for i in range(6)])) for v in (live, fresh)]
+    assert errors[0] < 1.4 * errors[1], errors
+    assert live.number("cells") < 2 * fresh.number("cells")
+    agree(mean_of([live.run(seed=200 + i) for i in range(6)]), mean_of([other.run(seed=300 + i) for i in range(6)]), tolerance=0.02)
+
+
+def mean_of(images: list[np.ndarray]) -> Mean:
+    values = [float(image.mean(dtype=np.float64)) for image in images]
+    return Mean(float(np.mean(values)), float(np.std(values, ddof=1) / len(values) ** 0.5))
+
+
+def test_an_object_that_flies_away_costs_no_cells() -> None:
+    """Ten times as far as the scene is wide: what the rest of the scene knows stays."""
+    live = Live(room(), samples=8)
+    cells = live.number("cells")
+    for away in (5.0, 20.0, 9.0):
+        live.edit(lambda away=away: live.built.scene.set_transforms(live.built.instances["Ball"], translate((away, 0, 0))[None]))
+    assert live.number("cache_resets") == 1 and live.number("cells") > 0.8 * cells

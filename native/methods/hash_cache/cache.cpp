@@ -56,7 +56,8 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   SceneChanges seen = changes;
   seen.camera = false;
   const InstanceMask shown = work.shown ? *work.shown : InstanceMask{};
-  const bool elsewhere = stale_ || changes.everything || changes.origin || shown != shown_instances_;
+  const bool elsewhere = stale_ || changes.everything || changes.origin || shown != shown_instances_ ||
+                         !grid_.serves(scene.scene.bounds());
   const bool edit = pending_ || !seen.empty();
   shown_instances_ = shown;
   if (elsewhere || (edit && (!settings_.keep || healing_.probe_count() < kFewProbes))) {

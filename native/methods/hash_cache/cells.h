@@ -69,6 +69,14 @@ class Grid {
               std::ldexp(finest_, kRadiusLevel) * Vec3(0.3137f, 0.2741f, 0.3459f);
   }
   Grid(float finest, const Vec3& corner) : finest_(finest), corner_(corner) {}
+  /// Whether cells that were made for a scene serve it with other bounds as well: within reach, and neither the largest
+  /// far too small nor the finest far too large.
+  bool serves(const Box& bounds) const {
+    if (bounds.empty()) return true;
+    const float scale = Grid(bounds).finest_ / finest_, reach = std::ldexp(finest_, 30);
+    const Vec3 farthest = glm::max(glm::abs(bounds.lower - corner_), glm::abs(bounds.upper - corner_));
+    return scale <= 8.0f && scale >= 1.0f / 64.0f && glm::max(farthest.x, glm::max(farthest.y, farthest.z)) < reach;
+  }
   float finest() const { return finest_; }
   const Vec3& corner() const { return corner_; }
   float size(int level) const { return finest_ * float(1u << level); }
