@@ -306,7 +306,9 @@ void Lights::commit(const Scene& scene, const SceneChanges& changes, const Mater
   const bool emitters = all || materials_changed || s.meshes.touched_by(changes, scene, materials);
   if (emitters) s.collect_emission();
   if (lights || emitters) s.build_tree();
-  if (all || changes.world || !changes.images_edited.empty()) s.build_world();
+  const bool world = all || changes.world || !changes.images_edited.empty();
+  if (world) s.build_world();
+  if (lights || emitters || world) version_++;
   has_lone_ = s.find_lone(lone_);
 }
 

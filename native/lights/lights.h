@@ -60,6 +60,8 @@ class Lights {
   Effects effects() const;
   uint32_t count() const;
   size_t bytes() const;
+  /// Another number, another answer of sample().
+  uint64_t version() const { return version_; }
 
   /// normal 0: light from all sides counts (translucent surfaces). False: nothing to sample from here.
   bool sample(const Vec3& position, const Vec3& normal, float u_light, const Vec2& u, LightSample&) const;
@@ -91,6 +93,7 @@ class Lights {
   std::unique_ptr<State> state_;
   LoneLight lone_;
   bool has_lone_ = false;
+  uint64_t version_ = 0;
 };
 
 }  // namespace afterglow

@@ -21,6 +21,21 @@ Material default_grey() {
   return grey;
 }
 
+/// Blender tells of images with every frame. What a file holds may be other than it was: its name says nothing.
+bool same_content(const Image& a, const Image& b) {
+  if (a.name != b.name || a.colorspace != b.colorspace || a.alpha != b.alpha || a.tiles.size() != b.tiles.size())
+    return false;
+  for (const auto& [number, source] : a.tiles) {
+    const auto other = b.tiles.find(number);
+    if (other == b.tiles.end() || !source || !other->second) return false;
+    const ImageSource &x = *source, &y = *other->second;
+    if (!x.path.empty() || !y.path.empty() || x.encoded != y.encoded || x.pixels != y.pixels ||
+        x.byte_pixels != y.byte_pixels || x.width != y.width || x.height != y.height || x.channels != y.channels)
+      return false;
+  }
+  return !a.tiles.empty();
+}
+
 }  // namespace
 
 Scene::Scene() : state_(std::make_unique<State>()) {
@@ -36,6 +51,7 @@ Handle Scene::add_image(Image image) {
 }
 
 void Scene::set_image(Handle handle, Image image) {
+  if (same_content(state_->images.at(handle), image)) return;
   state_->images.at(handle) = std::move(image);
   state_->pending.note(ChangeSet::kImage, handle, ChangeSet::kEdited);
 }

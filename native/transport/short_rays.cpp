@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/packing.h"
 #include "lights/shapes.h"
 
 namespace afterglow {
@@ -11,70 +12,114 @@ namespace afterglow {
 namespace {
 
 constexpr uint32_t kDimensions = 12;  // of a vertex
-constexpr int kMostPassages = 16;     // transparent surfaces before one that is met
+constexpr uint32_t kWay = 0, kStraight = 2, kSide = 3, kLamp = 4, kLampChoice = 6, kLight = 7, kGroupChoice = 8;
+constexpr int kMostPassages = 16;  // transparent surfaces before one that is met
+using Stop = ShortRayStop;
 
-float sum(const Rgb& c) { return c.x + c.y + c.z; }
+float sum_of(const Rgb& c) { return c.x + c.y + c.z; }
+
+Sampler sampler_at(const ShortRayPlace& place, uint32_t index, uint32_t depth, uint32_t dimension) {
+  Sampler sampler(place.seed, index);
+  sampler.set_dimension(kDimensions * (depth - 1) + dimension);
+  return sampler;
+}
 
 }  // namespace
 
-Rgb ShortRays::gather(const Vec3& position, const Vec3& normal, const Vec3& face_normal, float error, uint32_t seed,
-                      std::vector<float>& terms, RayCounts& counts) const {
+ShortRays::ShortRays(const WalkScene& walk, const VirtualLightColumns& lights, SlotPlan plan, float bound,
+                     uint32_t count)
+    : walk_(walk), lights_(lights), plan_(std::move(plan)), bound_(bound), count_(count) {
+  const Vec3 size = walk.scene.scene.bounds().size();
+  far_ = 4.0f * (size.x + size.y + size.z);
+  if (!(bound_ > 0.0f) || plan_.paths.empty()) count_ = 0;
+}
+
+Rgb ShortRays::gather(const ShortRayPlace& place, std::vector<Stop>& stops, RayCounts& counts) const {
+  stops.clear();
+  for (uint32_t k = 0; k < count_; ++k) walk(place, k, stops, counts);
+  return sum(stops);
+}
+
+Rgb ShortRays::sum(std::span<const Stop> stops) const {
   Rgb total(0.0f);
+  for (const Stop& stop : stops) total += stop.light;
+  return count_ ? total / float(count_) : total;
+}
+
+bool ShortRays::direction(const ShortRayPlace& place, uint32_t index, uint32_t depth, const Vec3& around,
+                          const Vec3& face, Vec3& out) const {
+  const Vec2 way = sampler_at(place, index, depth, kWay).next2();
+  out = glm::normalize(Frame(around).to_world(square_to_cosine_hemisphere(way)));
+  return glm::dot(out, face) > 0.0f;
+}
+
+void ShortRays::walk(const ShortRayPlace& place, uint32_t index, std::vector<Stop>& stops, RayCounts& counts) const {
   const uint32_t bounces = uint32_t(plan_.paths.size());
-  if (!count_ || !(bound_ > 0.0f) || !bounces) return total;
-  const float reach = 1.2f * bound_;
-  for (uint32_t k = 0; k < count_; ++k) {
-    Sampler sampler(seed, k);
-    Rgb throughput(1.0f), found(0.0f);
-    PathContext context;
-    context.kind = PathContext::kDiffuse | PathContext::kReflection;
-    context.drop_glossy = !walk_.limits.caustics_reflective,
-    context.drop_refractive = !walk_.limits.caustics_refractive;
-    Vec3 from = position, around = normal, face = face_normal, lifted = position + error * face_normal;
-    // As paths are counted: what a translucent surface lets through is not a diffuse bounce.
-    uint32_t reflected = 1, transmitted = 0;
-    for (uint32_t depth = 1; depth <= std::max(walk_.limits.max_bounces, 1u); ++depth) {
-      sampler.set_dimension(kDimensions * (depth - 1));
-      const Vec2 way = sampler.next2(), place = sampler.next2();
-      const float u_light = sampler.next1(), u_virtual = sampler.next1(), u_side = sampler.next1(),
-                  u_straight = sampler.next1();
-      Ray ray;
-      ray.origin = lifted;
-      ray.direction = glm::normalize(Frame(around).to_world(square_to_cosine_hemisphere(way)));
-      if (glm::dot(ray.direction, face) <= 0.0f) break;
-      ray.t_max = reach, ray.mask = kVisibleDiffuse;
-      context.depth = uint16_t(depth);
-      SurfacePoint point;
-      Surface surface, diffuse;
-      if (!meet(ray, from, u_straight, context, point, surface, throughput, counts)) break;
-      throughput *= 1.0f - smooth_bound(0.8f * bound_, reach, glm::distance(from, point.position));
-      split_diffuse(surface, diffuse);
-      Rgb albedo[2] = {Rgb(0.0f), Rgb(0.0f)};
-      for (int i = 0; i < diffuse.count; ++i)
-        albedo[diffuse.lobes[i].kind == LobeKind::kTranslucent] += diffuse.lobes[i].weight;
-      const float weight[2] = {sum(albedo[0]), sum(albedo[1])};
-      if (!(weight[0] + weight[1] > 0.0f) || is_black(throughput)) break;
-      Rgb direct;
-      bool back;
-      if (from_emitters(point, context, weight[1] > 0.0f, u_light, place, direct, back, counts))
-        found += throughput * albedo[back] * direct;
-      const bool side = u_side * (weight[0] + weight[1]) >= weight[0];
-      throughput *= albedo[side] * ((weight[0] + weight[1]) / weight[side]);
-      (side ? transmitted : reflected)++;
-      if (depth >= walk_.limits.max_bounces || reflected > bounces || transmitted > walk_.limits.transmission) break;
-      const uint32_t left = bounces - std::min(side ? reflected : reflected - 1, bounces);
-      if (left) {
-        const uint32_t slots = left < bounces ? plan_.first[left] : plan_.slots;
-        found += throughput * from_lights(point, side, slots, u_virtual, terms, counts);
-      }
-      from = point.position, around = side ? -point.normal : point.normal;
-      face = side ? -point.face_normal : point.face_normal;
-      lifted = from + point.error * face;
-      context.kind = PathContext::kDiffuse | (side ? PathContext::kTransmission : PathContext::kReflection);
+  Rgb throughput(1.0f);
+  PathContext context;
+  context.kind = PathContext::kDiffuse | PathContext::kReflection;
+  context.drop_glossy = !walk_.limits.caustics_reflective, context.drop_refractive = !walk_.limits.caustics_refractive;
+  Vec3 from = place.position, around = place.normal, face = place.face_normal;
+  float error = place.error;
+  // As paths are counted: what a translucent surface lets through is not a diffuse bounce.
+  uint32_t reflected = 1, transmitted = 0;
+  const uint32_t deepest = std::clamp(walk_.limits.max_bounces, 1u, 255u);
+  for (uint32_t depth = 1; depth <= deepest; ++depth) {
+    Ray ray;
+    ray.origin = from + error * face;
+    if (!direction(place, index, depth, around, face, ray.direction)) return;
+    ray.t_max = reach(), ray.mask = kVisibleDiffuse;
+    context.depth = uint16_t(depth);
+    Sampler sampler = sampler_at(place, index, depth, kStraight);
+    const float u_straight = sampler.next1(), u_side = sampler.next1();
+    SurfacePoint point;
+    Surface surface, diffuse;
+    if (!meet(ray, from, u_straight, context, point, surface, throughput, counts)) return;
+    throughput *= 1.0f - smooth_bound(0.8f * bound_, reach(), glm::distance(from, point.position));
+    split_diffuse(surface, diffuse);
+    Rgb albedo[2] = {Rgb(0.0f), Rgb(0.0f)};
+    for (int i = 0; i < diffuse.count; ++i)
+      albedo[diffuse.lobes[i].kind == LobeKind::kTranslucent] += diffuse.lobes[i].weight;
+    const float weight[2] = {sum_of(albedo[0]), sum_of(albedo[1])};
+    if (!(weight[0] + weight[1] > 0.0f) || is_black(throughput)) return;
+    Stop stop;
+    stop.position = point.position, stop.error = point.error;
+    stop.normal = pack_direction(point.normal), stop.face_normal = pack_direction(point.face_normal);
+    for (int side : {0, 1}) stop.weight[side] = pack_color(throughput * albedo[side]);
+    stop.walk = uint16_t(index), stop.depth = uint8_t(depth);
+    const bool back = u_side * (weight[0] + weight[1]) >= weight[0];
+    throughput *= albedo[back] * ((weight[0] + weight[1]) / weight[back]);
+    (back ? transmitted : reflected)++;
+    if (back) stop.flags |= Stop::kBack;
+    const bool ends = depth >= deepest || reflected > bounces || transmitted > walk_.limits.transmission;
+    if (!ends) {
+      stop.flags |= Stop::kGoesOn;
+      stop.left = uint8_t(std::min(bounces - std::min(back ? reflected : reflected - 1, bounces), 255u));
     }
-    if (is_finite(found)) total += glm::max(found, Rgb(0.0f));
+    find_light(place, stop, counts);
+    stops.push_back(stop);
+    if (ends) return;
+    from = point.position, error = point.error;
+    const float side = back ? -1.0f : 1.0f;
+    around = side * unpack_direction(stop.normal), face = side * unpack_direction(stop.face_normal);
+    context.kind = PathContext::kDiffuse | (back ? PathContext::kTransmission : PathContext::kReflection);
   }
-  return total / float(count_);
+}
+
+void ShortRays::find_light(const ShortRayPlace& place, Stop& stop, RayCounts& counts) const {
+  Sampler sampler = sampler_at(place, stop.walk, stop.depth, kLamp);
+  const Vec2 u = sampler.next2();
+  const float u_lamp = sampler.next1(), u_light = sampler.next1();
+  SurfacePoint point;
+  point.position = stop.position, point.error = stop.error;
+  point.normal = unpack_direction(stop.normal), point.face_normal = unpack_direction(stop.face_normal);
+  Rgb found = from_emitters(point, stop, u_lamp, u, counts);
+  if (stop.left)
+    found += from_lights(place, stop, u_light, counts);
+  else
+    stop.chosen = kNone, stop.flags &= uint8_t(~Stop::kLightKnown);
+  stop.light = is_finite(found) ? glm::max(found, Rgb(0.0f)) : Rgb(0.0f);
+  stop.flags &= uint8_t(~Stop::kStale);
 }
 
 /// The first surface that light does not go straight through.
@@ -91,10 +136,10 @@ bool ShortRays::meet(Ray& ray, const Vec3& from, float u, PathContext& context, 
     if (walk_.shows(hit.instance)) {
       context.ray_length = hit.t;
       scene.materials.shade(scene.scene, point, context, surface);
-      const float through = sum(surface.transparency);
+      const float through = sum_of(surface.transparency);
       if (!(through > 0.0f)) return true;
       float rest = 0.0f;
-      for (int i = 0; i < surface.count; ++i) rest += sum(surface.lobes[i].weight);
+      for (int i = 0; i < surface.count; ++i) rest += sum_of(surface.lobes[i].weight);
       const float chance = rest > 0.0f ? through / (through + rest) : 1.0f;
       if (u >= chance) {
         throughput /= 1.0f - chance;
@@ -111,51 +156,93 @@ bool ShortRays::meet(Ray& ray, const Vec3& from, float u, PathContext& context, 
   return false;
 }
 
-/// Irradiance by one sample of the emitters, on the side that it comes to.
-bool ShortRays::from_emitters(const SurfacePoint& point, const PathContext& context, bool both_sides, float u_light,
-                              const Vec2& u, Rgb& light, bool& back, RayCounts& counts) const {
+/// What one sample of the emitters sends through here, on the side that it comes to.
+Rgb ShortRays::from_emitters(const SurfacePoint& point, Stop& stop, float u_light, const Vec2& u,
+                             RayCounts& counts) const {
+  const bool known = stop.flags & Stop::kLampKnown;
+  stop.flags &= uint8_t(~Stop::kLampKnown);
   LightSample s;
-  if (!walk_.scene.lights.sample(point.position, both_sides ? Vec3(0.0f) : point.normal, u_light, u, s)) return false;
-  if (!(s.visibility & kVisibleDiffuse)) return false;
+  const bool both_sides = stop.both_sides();
+  if (!walk_.scene.lights.sample(point.position, both_sides ? Vec3(0.0f) : point.normal, u_light, u, s) ||
+      !(s.visibility & kVisibleDiffuse))
+    return Rgb(0.0f);
   const float cosine = glm::dot(s.direction, point.normal);
-  back = cosine < 0.0f;
-  if ((back && !both_sides) || cosine * glm::dot(s.direction, point.face_normal) <= 0.0f) return false;
-  light = s.radiance * (std::fabs(cosine) / s.density);
-  if (is_black(light) || !is_finite(light)) return false;
-  if (!s.cast_shadow) return true;
+  const bool back = cosine < 0.0f;
+  if ((back && !both_sides) || cosine * glm::dot(s.direction, point.face_normal) <= 0.0f) return Rgb(0.0f);
+  const Rgb light = unpack_color(stop.weight[back]) * s.radiance * (std::fabs(cosine) / s.density);
+  if (is_black(light) || !is_finite(light) || !s.cast_shadow) return light;
   const Ray ray = shadow_ray(point, s);
-  counts.shadow++;
-  if (!walk_.shown && !walk_.scene.effects.has(kTransparency)) return !walk_.scene.rays.occluded(ray);
-  light *= transmittance(walk_, ray, context, counts);
-  return !is_black(light);
+  const Vec3 end = ray.origin + ray.direction * std::min(ray.t_max, far_);
+  if (!known || stop.lamp_end != end) {
+    PathContext context;
+    context.depth = stop.depth;
+    counts.shadow++;
+    stop.passes[0] = pack_transmittance(!walk_.shown && !walk_.scene.effects.has(kTransparency)
+                                            ? Rgb(walk_.scene.rays.occluded(ray) ? 0.0f : 1.0f)
+                                            : transmittance(walk_, ray, context, counts));
+    stop.lamp_end = end;
+  }
+  stop.flags |= Stop::kLampKnown;
+  return light * unpack_transmittance(stop.passes[0]);
 }
 
-/// Irradiance of the first slots' lights on one side, by one of them that is chosen by what it would bring unhidden.
-Rgb ShortRays::from_lights(const SurfacePoint& point, bool back, uint32_t slots, float u, std::vector<float>& terms,
-                           RayCounts& counts) const {
-  const Vec3 normal = back ? -point.normal : point.normal, face = back ? -point.face_normal : point.face_normal;
-  geometry_terms(lights_, point.position, normal, bound_, terms.data());
-  const auto bring = [&](uint32_t k) {
-    const auto& light = terms[k] > 0.0f ? lights_.front : lights_.back;
-    return std::fabs(terms[k]) * (light[0][k] + light[1][k] + light[2][k]);
-  };
+/// Two groups as far from each other as can be; each is as likely as the others.
+void ShortRays::groups(const ShortRayPlace& place, const Stop& stop, uint32_t (&found)[kGroups]) const {
+  const uint32_t all = (slots(stop) + kGroup - 1) / kGroup;
+  const float step = std::max(float(all) / float(kGroups), 1.0f);
+  const float u = sampler_at(place, stop.walk, stop.depth, kGroupChoice).next1();
+  for (uint32_t i = 0; i < kGroups; ++i) found[i] = std::min(uint32_t((u + float(i)) * step), all - 1);
+}
+
+/// What the virtual lights send through here, by one of them: of two groups of slots, which depend on nothing else, the
+/// one that is chosen by what it would bring unhidden (resampling, Talbot et al. 2005). Lights of other groups can do
+/// what they want.
+Rgb ShortRays::from_lights(const ShortRayPlace& place, Stop& stop, float u, RayCounts& counts) const {
+  const uint32_t before = stop.flags & Stop::kLightKnown ? stop.chosen : kNone, most = slots(stop);
+  stop.flags &= uint8_t(~Stop::kLightKnown);
+  stop.chosen = kNone;
+  const bool behind = stop.flags & Stop::kBack;
+  const Vec3 normal = unpack_direction(stop.normal) * (behind ? -1.0f : 1.0f);
+  uint32_t group[kGroups];
+  groups(place, stop, group);
+  float terms[kGroups * kGroup], brings[kGroups * kGroup];
+  uint32_t count = 0;
   float all = 0.0f;
-  for (uint32_t k = 0; k < slots; ++k) all += bring(k);
+  for (uint32_t i = 0; i < kGroups; ++i) {
+    if (i && group[i] == group[i - 1]) continue;
+    const uint32_t first = group[i] * kGroup;
+    geometry_terms(lights_, stop.position, normal, bound_, terms + count, first, kGroup);
+    for (uint32_t k = 0; k < kGroup; ++k) {
+      const float g = terms[count + k];
+      const auto& light = g > 0.0f ? lights_.front : lights_.back;
+      const float b = std::fabs(g) * (light[0][first + k] + light[1][first + k] + light[2][first + k]);
+      all += brings[count + k] = first + k < most ? b : 0.0f;
+    }
+    count += kGroup;
+  }
   if (!(all > 0.0f) || !std::isfinite(all)) return Rgb(0.0f);
   float target = u * all;
-  uint32_t chosen = kNone;
-  for (uint32_t k = 0; k < slots; ++k) {
-    const float b = bring(k);
-    if (!(b > 0.0f)) continue;
-    chosen = k;
-    if ((target -= b) < 0.0f) break;
+  uint32_t at = kNone;
+  for (uint32_t k = 0; k < count; ++k) {
+    if (!(brings[k] > 0.0f)) continue;
+    at = k;
+    if ((target -= brings[k]) < 0.0f) break;
   }
+  const uint32_t chosen = group[at / kGroup] * kGroup + at % kGroup;
   const VirtualLight& light = lights_.lights[chosen];
-  const bool front = terms[chosen] > 0.0f;
-  if (!can_see(point.position, face, light, front)) return Rgb(0.0f);
-  const Ray ray = visibility_ray(point.position + point.error * face, light);
-  return (front ? light.front : light.back) * (std::fabs(terms[chosen]) * all / bring(chosen)) *
-         visibility(walk_, ray, counts);
+  const bool front = terms[at] > 0.0f;
+  const Vec3 face = unpack_direction(stop.face_normal) * (behind ? -1.0f : 1.0f);
+  if (!can_see(stop.position, face, light, front)) return Rgb(0.0f);
+  if (chosen != before)
+    stop.passes[1] =
+        pack_transmittance(visibility(walk_, visibility_ray(stop.position + stop.error * face, light), counts));
+  stop.chosen = chosen, stop.flags |= Stop::kLightKnown;
+  // As one side was chosen to go on from.
+  const Rgb albedo[2] = {unpack_color(stop.weight[0]), unpack_color(stop.weight[1])};
+  const float sides = (sum_of(albedo[0]) + sum_of(albedo[1])) / std::max(sum_of(albedo[behind]), 1e-30f);
+  const float share = float((most + kGroup - 1) / kGroup) * float(kGroup) / float(count);
+  return albedo[behind] * (front ? light.front : light.back) * unpack_transmittance(stop.passes[1]) *
+         (std::fabs(terms[at]) * all / brings[at] * sides * share);
 }
 
 }  // namespace afterglow

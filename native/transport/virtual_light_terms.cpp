@@ -25,13 +25,13 @@ void VirtualLightColumns::fill(std::vector<VirtualLight> from) {
   }
 }
 
-void geometry_terms(const VirtualLightColumns& c, const Vec3& p, const Vec3& n, float bound, float* out) {
+void geometry_terms(const VirtualLightColumns& c, const Vec3& p, const Vec3& n, float bound, float* out, uint32_t first,
+                    uint32_t count) {
   const float near = 0.8f * bound, scale = bound > 0.0f ? 1.0f / (0.4f * bound) : 0.0f;
-  const size_t size = c.padded();
-  const float *x = c.x.data(), *y = c.y.data(), *z = c.z.data(), *nx = c.nx.data(), *ny = c.ny.data(),
-              *nz = c.nz.data();
+  const float *x = c.x.data() + first, *y = c.y.data() + first, *z = c.z.data() + first, *nx = c.nx.data() + first,
+              *ny = c.ny.data() + first, *nz = c.nz.data() + first;
   const bool two_sided = c.two_sided;
-  for (size_t i = 0; i < size; ++i) {
+  for (size_t i = 0; i < count; ++i) {
     const float dx = x[i] - p.x, dy = y[i] - p.y, dz = z[i] - p.z;
     const float d2 = std::max(dx * dx + dy * dy + dz * dz, 1e-30f);
     const float here = std::max(dx * n.x + dy * n.y + dz * n.z, 0.0f);

@@ -66,8 +66,13 @@ inline float smooth_bound(float a, float b, float x) {
 }
 
 /// The bounded geometry term (2) of all lights seen from a point, [padded()]: cos⁺ cos / d² · f(0.8 m, 1.2 m, d).
-/// Negative where the light shows its back. m = 0: no bound.
-void geometry_terms(const VirtualLightColumns&, const Vec3& position, const Vec3& normal, float bound, float* out);
+/// Negative where the light shows its back. m = 0: no bound. Or those of some alone: `count` from slot `first` on.
+void geometry_terms(const VirtualLightColumns&, const Vec3& position, const Vec3& normal, float bound, float* out,
+                    uint32_t first, uint32_t count);
+inline void geometry_terms(const VirtualLightColumns& lights, const Vec3& position, const Vec3& normal, float bound,
+                           float* out) {
+  geometry_terms(lights, position, normal, bound, out, 0, lights.padded());
+}
 
 /// The same terms' derivatives, [padded()] each: over steps along t and b (of a frame whose normal is the place's), and
 /// over turns of the normal towards t and b. As in Ward and Heckbert 1992, but exact, since each light is known.

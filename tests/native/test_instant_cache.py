@@ -207,6 +207,7 @@ def test_records_equal_fresh_ones_after_random_edits(seed: int) -> None:
 def test_lights_that_fill_no_whole_word_are_kept_apart() -> None:
     """Visibility is kept in words of 64 lights: bits beyond the last light are nobody's."""
     run_edits(60, 3, width=8, height=8, virtual_lights=37)
+    run_edits(100, 5, width=8, height=8, virtual_lights=96, light_compensation=6, light_bound=4.0)
 
 
 @pytest.mark.slow

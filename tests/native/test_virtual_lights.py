@@ -153,10 +153,44 @@ def test_records_with_short_rays_equal_fresh_ones_after_edits() -> None:
         lambda: scene.set_material(built.materials["ball"], graph(node("transparent_bsdf", color=(0.9, 0.5, 0.2)))),
         lambda: scene.set_instances(built.instances["Ball"], visibility=0),
         lambda: scene.set_transforms(built.instances["Walls"], rotate(0.1)[None]),
+        lambda: scene.set_light(built.lights["Sun"], color=(0, 0, 0)),
+        lambda: scene.set_light(built.lights["Sun"], color=(1, 1, 1)),
+        lambda: scene.set_transforms(built.instances["Shed"], translate((3.5, 3.5, 0))[None]),
+        lambda: scene.set_instances(built.instances["Ball"], visibility=0xffff),
+        lambda: scene.set_light(built.lights["Sun"], cast_shadow=False),
+        lambda: scene.set_light(built.lights["Sun"], cast_shadow=True),
+        lambda: scene.set_world(graph(background((0.9, 0.2, 0.1), 2.0))),
     ]
     for change in edits:
         numbers = live.edit(change)
         assert numbers["verified_worst"] <= 1e-5 and numbers["verified_records"] > 10 and numbers["resets"] == 1
+
+
+def test_short_rays_are_traced_again_only_where_an_edit_touches_them() -> None:
+    """Strength alone traces next to nothing (it has a say in the choice between sun and sky); what moves far from most records
+    leaves most short rays alone."""
+    live = Live(light_compensation=16, light_bound=4.0, virtual_lights=64)
+    scene, built = live.built.scene, live.built
+
+    def rays(change: Any) -> float:
+        before = live.session.statistics()["rays"]["update"]
+        numbers = live.edit(change)
+        assert numbers["verified_worst"] <= 1e-5 and numbers["resets"] == 1
+        return numbers["update_rays"] - before
+
+    dimmed = rays(lambda: scene.set_light(built.lights["Sun"], power=15.0))
+    tinted = rays(lambda: scene.set_light(built.lights["Sun"], color=(1.0, 0.8, 0.7)))
+    everything = rays(lambda: scene.set_transforms(built.instances["Walls"], translate((0.001, 0, 0))[None]))
+    records = live.session.statistics()["values"]["records"]
+    assert everything > 64 * records and max(dimmed, tinted) < 0.01 * everything
+    few = max(rays(lambda x=x: scene.set_transforms(built.instances["Ball"], translate((x, 0.6, 0.3))[None]))
+              for x in (-0.81, -0.8, -0.79))
+    assert few < 0.35 * everything, (few, everything)
+
+
+def test_short_rays_cost_no_memory_where_there_are_none() -> None:
+    values = [Live(light_compensation=n).session.statistics()["values"] for n in (0, 16)]
+    assert values[0]["record_bytes"] < 330 < values[1]["record_bytes"]
 
 
 @pytest.mark.parametrize("lamp", ["area", "sun"])

@@ -6,8 +6,8 @@
 #include <atomic>
 #include <bit>
 #include <chrono>
-#include <utility>
 
+#include "base/packing.h"
 #include "base/parallel.h"
 
 namespace afterglow::instant_cache {
@@ -24,12 +24,6 @@ uint32_t round_of(const CachePoint& p) {
   return both % 16 == 0 ? 0 : both % 8 == 0 ? 1 : both % 4 == 0 ? 2 : both % 2 == 0 ? 3 : 4;
 }
 constexpr uint32_t kRounds = 5;
-
-/// The same rays wherever the record's object goes.
-Rgb found_nearby(const ShortRays& rays, const Record& r, std::vector<float>& terms, RayCounts& counts) {
-  const uint32_t seed = hash(r.place.triangle, std::bit_cast<uint32_t>(r.place.u), std::bit_cast<uint32_t>(r.place.v));
-  return rays.gather(r.position, r.normal, r.face_normal, r.error, seed, terms, counts);
-}
 
 }  // namespace
 
@@ -95,6 +89,7 @@ bool Cache::insert(const CommittedScene& scene, const CachePoint& p) {
   used_.push_back(update_);
   wanted_.push_back(0);
   visibility_.add_row();
+  if (settings_.lights.short_rays) nearby_.add_row();
   counts_.created++;
   return true;
 }
@@ -160,8 +155,7 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
         sums.terms.resize(lights_.padded());
         for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
           Record& record = records_[which[i]];
-          if (settings_.lights.short_rays && !std::exchange(record.compensated, true))
-            record.compensation = found_nearby(nearby, record, sums.terms, counts);
+          if (settings_.lights.short_rays) record.compensation = nearby_.repair(which[i], nearby, record, counts);
           ask(walked, which[i], sums.terms.data(), counts);  // leaves the record's terms
           sum(which[i], sums);
         }
@@ -211,6 +205,7 @@ Verification Cache::verify(const CommittedScene& scene, Work& work) const {
   const ShortRays nearby = short_rays(walked);
   parallel_blocks(records_.size(), kRecordBlock, work.threads, [&](size_t begin, size_t end) {
     std::vector<float> terms(lights_.padded());
+    std::vector<ShortRayStop> stops;
     RayCounts counts;
     for (size_t i = begin; i < end; ++i) {
       const Record& stored = records_[i];
@@ -229,7 +224,7 @@ Verification Cache::verify(const CommittedScene& scene, Work& work) const {
         if (visibility_.coloured()) seen = unpack_transmittance(pack_transmittance(seen));
         sum += std::fabs(g) * light * seen;
       }
-      sum += found_nearby(nearby, fresh, terms, counts);
+      sum += nearby.gather(short_ray_place(fresh), stops, counts);
       const Rgb off = glm::abs(sum - stored.irradiance);
       const double relative = double(max_component(off)) / std::max(double(max_component(sum)), 1e-30);
       const std::lock_guard lock(mutex);
@@ -241,10 +236,14 @@ Verification Cache::verify(const CommittedScene& scene, Work& work) const {
   return result;
 }
 
-size_t Cache::record_bytes() const { return sizeof(Record) + 5 + visibility_.row_bytes(); }
+size_t Cache::record_bytes() const {
+  const size_t nearby = records_.empty() ? 0 : nearby_.bytes() / records_.size();
+  return sizeof(Record) + 5 + visibility_.row_bytes() + nearby;
+}
 
 size_t Cache::bytes() const {
-  return records_.capacity() * sizeof(Record) + visibility_.bytes() + octree_.bytes() + 5 * records_.capacity();
+  return records_.capacity() * sizeof(Record) + visibility_.bytes() + octree_.bytes() + nearby_.bytes() +
+         5 * records_.capacity();
 }
 
 }  // namespace afterglow::instant_cache

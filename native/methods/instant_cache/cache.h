@@ -10,11 +10,11 @@
 
 #include "methods/instant_cache/interpolation.h"
 #include "methods/instant_cache/moved.h"
+#include "methods/instant_cache/nearby.h"
 #include "methods/virtual_light_settings.h"
 #include "methods/walk_settings.h"
 #include "rays/ray_subset.h"
 #include "transport/light_importance.h"
-#include "transport/short_rays.h"
 
 namespace afterglow::instant_cache {
 
@@ -84,6 +84,7 @@ class Cache {
   void prepare_moved_rays(const CommittedScene&, const std::vector<Moved>&);
   void mark_hidden(size_t record);
   void mark(size_t record, const std::vector<uint64_t>& slots);
+  void mark_nearby(const CommittedScene&, const SceneChanges&, const std::vector<Moved>&, Work&);
   /// Whether the last frame was interrupted, told from how many records it asked.
   void look_back();
   void age();
@@ -119,6 +120,8 @@ class Cache {
   Viewpoint viewpoint_;  // that the lights were traced for
   VirtualLightColumns lights_;
   std::vector<uint64_t> front_, back_;  // bits: lights that shine on that side
+  LightChanges light_changes_;          // of the last update
+  uint64_t lamps_version_ = 0;
   Placement placement_;
   InstanceMask shown_;
   float bound_ = 0.0f;
@@ -127,6 +130,7 @@ class Cache {
 
   std::vector<Record> records_;
   VisibilityTable visibility_;
+  NearbyTable nearby_;                     // without short rays it has no rows
   std::vector<uint64_t> only_moved_;       // bits of records: was seen, and only what just moved can hide it
   std::unique_ptr<RaySubset> moved_rays_;  // through what just moved; both for the last update alone
   Octree octree_, fresh_;                  // all of them; those of the last fill()

@@ -18,8 +18,9 @@ namespace afterglow::instant_cache {
 
 namespace {
 
-constexpr size_t kManyObjects = 512;  // beyond, everything is asked again
-constexpr uint32_t kGroup = 16;       // records that are tested together
+constexpr size_t kManyObjects = 512;    // beyond, everything is asked again
+constexpr size_t kManyObstacles = 128;  // beyond, all short rays are traced again
+constexpr uint32_t kGroup = 16;         // records that are tested together
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -36,7 +37,8 @@ uint64_t spread_bits(uint64_t x) {  // every third bit
 
 bool same_walk(const WalkLimits& a, const WalkLimits& b) {
   return a.max_bounces == b.max_bounces && a.diffuse == b.diffuse && a.transparent == b.transparent &&
-         a.caustics_reflective == b.caustics_reflective && a.caustics_refractive == b.caustics_refractive;
+         a.transmission == b.transmission && a.caustics_reflective == b.caustics_reflective &&
+         a.caustics_refractive == b.caustics_refractive;
 }
 
 }  // namespace
@@ -45,8 +47,7 @@ void Cache::configure(const CacheSettings& settings) {
   const CacheSettings& o = settings_;
   stale_ |= !same_walk(settings.walk.limits, o.walk.limits) || settings.lights.count != o.lights.count ||
             settings.lights.pattern != o.lights.pattern || settings.lights.bound != o.lights.bound ||
-            settings.lights.short_rays != o.lights.short_rays ||
-            settings.accuracy != o.accuracy;
+            settings.lights.short_rays != o.lights.short_rays || settings.accuracy != o.accuracy;
   settings_ = settings;
   spacing_ = spacing_of(settings.accuracy);
 }
@@ -56,6 +57,7 @@ void Cache::reset(const CommittedScene& scene) {
   visibility_.reset(
       plan_slots(settings_.lights.count, settings_.lights.options(settings_.walk.limits, 0).bounces).slots,
       scene.effects.has(kTransparency) || !shown_.empty());
+  nearby_.reset(settings_.lights.short_rays);
   octree_.clear(center_, radius_);
   lights_.fill({});
   placement_.clear();
@@ -103,7 +105,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
     return;
   }
   age();
-  std::vector<uint64_t> moved_slots;
+  std::vector<uint64_t>& moved_slots = light_changes_.moved;
   bool recoloured = false;
   trace_lights(scene, work, moved_slots, recoloured);
   recoloured |= scaled;
@@ -115,6 +117,11 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   if (std::any_of(moved_slots.begin(), moved_slots.end(), [](uint64_t w) { return w != 0; }))
     for (size_t i = 0; i < records_.size(); ++i) mark(i, moved_slots);
   mark_crossings(moved, work);
+  if (settings_.lights.short_rays) {
+    if (other_bound)
+      for (size_t i = 0; i < records_.size(); ++i) nearby_.forget(i);
+    mark_nearby(scene, changes, moved, work);
+  }
 
   std::vector<uint32_t> waiting, dimmed;
   for (uint32_t i = 0; i < records_.size(); ++i) {
@@ -123,8 +130,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
     for (uint32_t w = 0; w < visibility_.words(); ++w)
       any |= unknown[w], counts_.pairs_marked += uint64_t(std::popcount(unknown[w]));
     counts_.pairs += lights_.count;
-    records_[i].compensated = false;  // whatever changed, it may be near, or near what short rays meet
-    if (any || settings_.lights.short_rays) {
+    if (any || (settings_.lights.short_rays && nearby_.unknown(i))) {
       records_[i].ready = false;
       if (was_used(i)) waiting.push_back(i);  // the others wait until somebody wants them
     } else if (recoloured) {
@@ -155,6 +161,8 @@ void Cache::trace_lights(const CommittedScene& scene, Work& work, std::vector<ui
       trace_virtual_lights(walk(scene), emission_, settings_.lights.options(settings_.walk.limits, work.threads), rays);
   const uint32_t slots = uint32_t(lights.size());
   moved_slots.assign(visibility_.words(), 0);
+  light_changes_.any = false;
+  light_changes_.grouped.assign(slots / ShortRays::kGroup + 1, 0);
   counts_.lights_moved = counts_.lights_recoloured = counts_.lights = 0;
   const bool first = lights_.count != slots;
   for (uint32_t k = 0; k < slots; ++k) {
@@ -163,7 +171,9 @@ void Cache::trace_lights(const CommittedScene& scene, Work& work, std::vector<ui
     const bool moved = first || !before.same_place(now);
     const bool lit = (is_black(before.front) && !is_black(now.front)) || (is_black(before.back) && !is_black(now.back));
     if (moved || lit) set_bit(moved_slots, k), counts_.lights_moved++;
-    if (!before.same_strength(now)) recoloured = true, counts_.lights_recoloured += !moved;
+    const bool other = !before.same_strength(now);
+    if (other) recoloured = true, counts_.lights_recoloured += !moved;
+    if (moved || other) light_changes_.any = true, light_changes_.grouped[k / ShortRays::kGroup] = 1;
   }
   lights_.fill(std::move(lights));
   front_.assign(visibility_.words(), 0), back_.assign(visibility_.words(), 0);
@@ -202,6 +212,7 @@ void Cache::follow(const CommittedScene& scene, const std::vector<Moved>& moved)
     }
     counts_.moved++;
     follows.push_back(i);
+    if (settings_.lights.short_rays) nearby_.forget(i);
     uint64_t* unknown = visibility_.unknown(i);
     std::fill_n(unknown, visibility_.words(), ~uint64_t(0));
     if (lights_.count % 64) unknown[visibility_.words() - 1] = (uint64_t(1) << (lights_.count % 64)) - 1;
@@ -300,6 +311,29 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
   });
 }
 
+/// What short rays met rides along with nothing: their walks go anew where an object's bounds touch them.
+void Cache::mark_nearby(const CommittedScene& scene, const SceneChanges& changes, const std::vector<Moved>& moved,
+                        Work& work) {
+  std::vector<Obstacle> obstacles;
+  for (const Moved& m : moved) {
+    if (m.before.present()) obstacles.emplace_back(m.before, m.in_place, true);
+    if (m.after.present() && !m.in_place) obstacles.emplace_back(m.after, true, false);
+  }
+  for (const Bounds& bounds : placement_.repainted(scene, changes)) obstacles.emplace_back(bounds, true, true);
+  const bool many = obstacles.size() > kManyObstacles;
+  light_changes_.lamps = std::exchange(lamps_version_, scene.lights.version()) != scene.lights.version();
+  if (!many && obstacles.empty() && !light_changes_.any && !light_changes_.lamps) return;
+  const WalkScene walked = walk(scene);
+  const ShortRays rays = short_rays(walked);
+  parallel_blocks(records_.size(), kGroup, work.threads, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      if (many)
+        nearby_.forget(i);
+      else
+        nearby_.mark(i, records_[i], rays, obstacles, light_changes_, lights_);
+  });
+}
+
 void Cache::look_back() {
   const size_t asked = size_t(std::count(used_.begin(), used_.end(), update_));
   interrupted_ = 2 * asked >= asked_whole_ ? 0 : interrupted_ + 1;
@@ -324,6 +358,7 @@ void Cache::keep(const std::vector<uint32_t>& kept) {
   }
   records_.resize(kept.size()), used_.resize(kept.size()), wanted_.resize(kept.size());
   visibility_.keep(kept);
+  nearby_.keep(kept);
 }
 
 void Cache::rebuild_octree() {

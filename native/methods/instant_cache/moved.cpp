@@ -71,18 +71,38 @@ Bounds bounds_of(const InstanceRecord& record) {
   return bounds;
 }
 
-}  // namespace
+bool contains(const std::vector<Handle>& list, Handle handle) {
+  return std::find(list.begin(), list.end(), handle) != list.end();
+}
 
-std::vector<Moved> Placement::update(const CommittedScene& committed, const SceneChanges& changes) {
-  const Scene& scene = committed.scene;
-  const auto records = scene.instances();
-  const auto contains = [](const std::vector<Handle>& list, Handle handle) {
-    return std::find(list.begin(), list.end(), handle) != list.end();
-  };
+/// A byte for each dense material.
+std::vector<uint8_t> edited_materials(const Scene& scene, const SceneChanges& changes) {
   std::vector<uint8_t> edited(scene.material_handles().size(), !changes.images_edited.empty());
   for (const auto* list : {&changes.materials_edited, &changes.materials_added})
     for (const Handle handle : *list)
       if (const uint32_t index = scene.material_index(handle); index < edited.size()) edited[index] = 1;
+  return edited;
+}
+
+}  // namespace
+
+std::vector<Bounds> Placement::repainted(const CommittedScene& committed, const SceneChanges& changes) const {
+  const std::vector<uint8_t> edited = edited_materials(committed.scene, changes);
+  std::vector<Bounds> found;
+  for (const Object& object : objects_) {
+    if (!object.handle || !object.bounds.present()) continue;
+    const bool any = std::any_of(object.materials.begin(), object.materials.end(),
+                                 [&](uint32_t m) { return m < edited.size() && edited[m]; });
+    if (any || !changes.materials_removed.empty() || contains(changes.instances_edited, object.handle))
+      found.push_back(object.bounds);
+  }
+  return found;
+}
+
+std::vector<Moved> Placement::update(const CommittedScene& committed, const SceneChanges& changes) {
+  const Scene& scene = committed.scene;
+  const auto records = scene.instances();
+  const std::vector<uint8_t> edited = edited_materials(scene, changes);
   std::vector<Moved> moved;
   std::unordered_map<Handle, std::shared_ptr<const Parts>> made;
   const size_t count = std::max(records.size(), objects_.size());

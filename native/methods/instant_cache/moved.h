@@ -38,6 +38,8 @@ class Placement {
   void clear() { objects_.clear(); }
   /// Compares with the scene of the last call and remembers the scene of this one.
   std::vector<Moved> update(const CommittedScene&, const SceneChanges&);
+  /// After update(): where objects stand that may look otherwise, or pass other light.
+  std::vector<Bounds> repainted(const CommittedScene&, const SceneChanges&) const;
 
  private:
   struct Object {

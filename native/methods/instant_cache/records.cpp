@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstring>
 
+#include "base/packing.h"
 #include "rays/surface_point.h"
 
 namespace afterglow::instant_cache {
@@ -42,15 +43,6 @@ Place place_of(const Scene& scene, const CachePoint& point) {
   Place place{point.instance, point.triangle, point.u, point.v, false};
   place.back = glm::dot(winding_normal(scene, place), point.face_normal) < 0.0f;
   return place;
-}
-
-uint16_t pack_transmittance(const Rgb& t) {
-  const auto part = [](float x, float steps) { return uint16_t(std::clamp(x, 0.0f, 1.0f) * steps + 0.5f); };
-  return uint16_t(part(t.x, 31.0f) << 11 | part(t.y, 63.0f) << 5 | part(t.z, 31.0f));
-}
-
-Rgb unpack_transmittance(uint16_t packed) {
-  return {float(packed >> 11) / 31.0f, float(packed >> 5 & 63) / 63.0f, float(packed & 31) / 31.0f};
 }
 
 void VisibilityTable::reset(uint32_t slots, bool coloured) {

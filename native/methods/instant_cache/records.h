@@ -32,17 +32,12 @@ struct Record {
   uint32_t born = 0, asked = 0;            // the updates after which it was made, and rays were last traced for it
   uint32_t rays = 0;                       // so many
   bool ready = false;                      // no visibility is unknown
-  bool compensated = false;                // short rays were traced for its light as it is
-  Rgb compensation{0.0f};                  // what they found; irradiance holds it already
+  Rgb compensation{0.0f};                  // what short rays found; irradiance holds it already
 };
 
 /// Where the place is now. False: the triangle has no area.
 bool locate(const Scene&, Record&);
 Place place_of(const Scene&, const CachePoint&);
-
-/// Transmittance to three small numbers; 0 and 1 are kept exactly.
-uint16_t pack_transmittance(const Rgb&);
-Rgb unpack_transmittance(uint16_t);
 
 /// Visibility of every virtual light from every record, and which of them have to be asked (again).
 class VisibilityTable {

@@ -64,6 +64,7 @@ class InstantRadiosity final : public IndirectMethod {
               std::span<Answer> answers) const override {
     RayCounts counts;
     std::vector<float> terms(whole_.padded());
+    std::vector<ShortRayStop> stops;
     const WalkScene walked = walk(scene);
     const VirtualLightSettings& s = lights_settings_;
     const ShortRays nearby(walked, whole_, plan_slots(s.count, s.options(settings_.limits, 0).bounces), bound_,
@@ -75,7 +76,7 @@ class InstantRadiosity final : public IndirectMethod {
       Rgb e = shares ? float(kParts) * irradiance(walked, parts_[part], p, terms, counts)
                      : irradiance(walked, whole_, p, terms, counts);
       if (s.short_rays)
-        e += nearby.gather(p.position, p.bent, p.face_normal, p.error, hash(hash(p.x, p.y, p.sample), p.layer), terms,
+        e += nearby.gather({p.position, p.bent, p.face_normal, p.error, hash(hash(p.x, p.y, p.sample), p.layer)}, stops,
                            counts);
       answers[i] = {e, 1.0f, 0.0f};
     }
