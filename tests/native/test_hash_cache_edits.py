@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import functools
 import math
+import time
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from afterglow.scenes import Camera, Description, Light, look_at, translate
 from afterglow.scenes.native import Built, graph
 from afterglow.scenes.rooms import diffuse
-from afterglow.scenes.shapes import join, quad, sphere
+from afterglow.scenes.shapes import box, join, quad, sphere
 from test_hash_cache import Live
 
 SIZE = 64
@@ -179,6 +180,62 @@ def test_edits_faster_than_pictures() -> None:
     assert error(pictures[8:], "halve_one") < 1.2 * error(run("halve_one", 1, 0, 10)[0][:, 9:], "halve_one")
 
 
+def plate_and_box() -> Description:
+    """A room with a lamp, in it a closed box, and a plate a centimetre above its lid: the cells there hold places on either side.
+    Walls of albedo 0.98 and many bounces make paths long, so that walking them again takes a while."""
+    scene = Description("plate", Camera(look_at((0, -0.9, 0.6), (0, 0, -0.1)), math.radians(50)))
+    scene.materials["white"] = diffuse((0.98, 0.98, 0.98))
+    scene.add("Room", box((-1, -1, -1), (1, 1, 1), inward=True), "white")
+    scene.add("Box", box((-0.6, -0.6, -0.99), (0.6, 0.6, 0)), "white")
+    scene.add("Plate", quad((-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0)), "white",
+              transform=translate((0, 0, 0.01)))
+    scene.lights = [Light("Lamp", "point", translate((0, 0, 0.7)), 10.0, radius=0.05)]
+    return scene
+
+
+LONG: dict[str, Any] = dict(width=32, height=32, samples=2, max_bounces=512, diffuse_bounces=512, hash_extra=0.0,
+                            hash_filter=False)
+INSIDE = ((0.0, -0.55, -0.2), (0.0, 0.0, -0.02))
+
+
+def move_plate(b: Built) -> None:
+    b.scene.set_transforms(b.instances["Plate"], translate((0, 0, -0.01))[None])
+
+
+def stopped(live: Live, change: Any, seed: int) -> bool:
+    """Makes the edit and begins anew with another seed a moment later; whether the first update was still under way then."""
+    with live.session.edit():
+        change(live.built)
+        live.built.scene.commit()
+    time.sleep(0.02)
+    caught = live.session.progress()["stage"] == "preparing"
+    live.session.update(dict(seed=seed))
+    live.session.wait()
+    return caught
+
+
+def test_an_object_that_moved_knows_nothing_any_more() -> None:
+    """From above the lid to beneath it, within its cells: there it is dark."""
+    live = Live(plate_and_box(), **LONG)
+    assert live.run(seed=1).min() > 0.01
+    live.edit(lambda: move_plate(live.built))
+    assert live.number("cache_edits") == 1 and live.look_from(*INSIDE).max() == 0.0
+
+
+def test_an_update_that_is_stopped_is_made_up_for() -> None:
+    """By one that knows of no edit, too; objects that moved before are not forgotten to be forgotten."""
+    caught = [0, 0]
+    for _ in range(4):
+        live = Live(plate_and_box(), **LONG)
+        bright = [live.run(seed=i).mean() for i in range(4)][1:]
+        caught[0] += stopped(live, lambda b: b.scene.set_light(b.lights["Lamp"], power=5.0), 50)
+        assert abs(live.session.read("diffuse_indirect").mean() / np.mean(bright) - 0.5) < 0.05
+        assert live.number("cache_edits") == 1 and live.number("cache_unannounced") == 0
+        caught[1] += stopped(live, move_plate, 51)
+        assert live.look_from(*INSIDE).max() == 0.0 and live.number("cache_resets") == 1
+    assert min(caught) > 0, "no update was slow enough to be stopped"
+
+
 def test_objects_leave_and_come_back() -> None:
     """Their cells forget; new objects that take a removed one's place know nothing of it."""
     live = Live(two_rooms(), start=False, **SETTINGS)
@@ -224,3 +281,22 @@ def test_a_cache_that_is_saved_after_an_edit_holds_no_old_light(tmp_path: Any) -
     image = live.run(seed=77)
     assert live.number("cells") <= 1.1 * cells
     assert abs(image.mean() / truth("halve_both")[0].mean() - 1) < 0.1
+
+
+def test_cells_out_of_sight_are_not_saved_as_they_were_before_an_edit(tmp_path: Any) -> None:
+    """The lamps are halved while the camera sees one wall; what the other room's cells held then is in no file."""
+    live = Live(two_rooms(), start=False, **SETTINGS)
+    for i in range(8):
+        live.run(seed=i)
+    live.look_from((-1.1, -1.0, 1.2), (-1.9, 0.5, 0.8))
+    live.edit(lambda: halve_both(live.built))
+    path = str(tmp_path / "cells")
+    live.session.save_cache(path)
+    other = Live(two_rooms(), start=False, **SETTINGS)
+    halve_both(other.built)
+    other.built.scene.commit()
+    other.session.load_cache(path)
+    image, expected = other.run(seed=77), truth("halve_both")[0]
+    assert other.number("cache_unannounced") == 0  # the paths were walked again before they were saved
+    for columns in (slice(0, SIZE // 2), slice(SIZE // 2, SIZE)):
+        assert abs(image[:, columns].mean() / expected[:, columns].mean() - 1) < 0.15

@@ -54,7 +54,7 @@ RADIUS = 8.0  # of the grid that a cube of eight metres gets
 def test_walls_on_borders_of_cells() -> None:
     """Wherever the room stands in the grid, a border included, the light is the same, and so is its noise."""
     truth = mean(room(), **TRUE)
-    border = [math.ceil((1 + RADIUS * c) * 4) / 4 - 1 - RADIUS * c for c in CORNER]  # x, y, z = 1 lie on borders, all levels' to 25 cm
+    border = [math.ceil((1 + RADIUS * c) * 4) / 4 - 1 - RADIUS * c for c in CORNER]  # 1 is on one, to 25 cm
     noise = []
     for shift in ([0.0] * 3, [0.2741] * 3, border, [b + 1e-6 for b in border], [b - 1e-6 for b in border]):
         scene = room(translate(shift))
@@ -126,7 +126,8 @@ def test_scene_grows_far_beyond_its_first_bounds(place: np.ndarray) -> None:
     errors = [float(np.median([np.abs(v.run(seed=100 + i) - truth) for i in range(6)])) for v in (live, fresh)]
     assert errors[0] < 1.4 * errors[1], errors
     assert live.number("cells") < 2 * fresh.number("cells")
-    agree(mean_of([live.run(seed=200 + i) for i in range(6)]), mean_of([other.run(seed=300 + i) for i in range(6)]), tolerance=0.02)
+    means = [mean_of([v.run(seed=200 + i) for i in range(6)]) for v in (live, other)]
+    agree(*means, tolerance=0.02)
 
 
 def mean_of(images: list[np.ndarray]) -> Mean:

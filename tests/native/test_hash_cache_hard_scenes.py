@@ -56,8 +56,9 @@ def bent_normals() -> Description:
 def odd_scales() -> Description:
     """Mirrored, flat, crushed to nothing, a kilometre long."""
     scene = room()
-    for i, (scales, place) in enumerate([((-1, 1, 1), (0.4, 0.3, -0.6)), ((1, 1, 1e-6), (-0.4, 0.3, -0.5)), ((0, 1, 1), (0, 0, 0)),
-                                         ((0.1, -0.1, 1e3), (-0.4, -0.3, -0.8)), ((0, 0, 0), (0, 0, 0))]):
+    things = [((-1, 1, 1), (0.4, 0.3, -0.6)), ((1, 1, 1e-6), (-0.4, 0.3, -0.5)), ((0, 1, 1), (0, 0, 0)),
+              ((0.1, -0.1, 1e3), (-0.4, -0.3, -0.8)), ((0, 0, 0), (0, 0, 0))]
+    for i, (scales, place) in enumerate(things):
         scene.add(f"Scaled {i}", sphere(0.3, 16, 8), "red", transform=translate(place) @ np.diag([*scales, 1.0]))
     return scene
 
@@ -133,8 +134,8 @@ def specks() -> Description:
 
 
 ODD: dict[str, Callable[[], Description]] = {
-    f.__name__: f for f in (needles, degenerate, bent_normals, odd_scales, mirrors, glass_in_glass, lamp_near_the_floor, grazing_sun,
-                            one_triangle, ten_thousand_instances, black_and_white, specks)
+    f.__name__: f for f in (needles, degenerate, bent_normals, odd_scales, mirrors, glass_in_glass, lamp_near_the_floor,
+                            grazing_sun, one_triangle, ten_thousand_instances, black_and_white, specks)
 } | dict(many_lights=SCENES["many_lights"], thin_walls=SCENES["thin_walls"])
 
 
@@ -154,7 +155,7 @@ def test_furnace_shows_its_radiance(albedo: float) -> None:
 
 
 def lamp_above_a_ball(height: float) -> float:
-    """The brightest pixel outside a closed ball whose lamp stands so high above its surface. The picture of the inside comes first."""
+    """The brightest pixel outside a closed ball whose lamp stands so high above its surface; the inside was seen first."""
     scene = Description("close", Camera(look_at((0, 0, 0.5), (0, 0.1, 1)), 1.5))
     ball = sphere(1.0, 64, 32)
     ball.smooth = False
@@ -221,7 +222,7 @@ def statistics_of(values: list[float]) -> Mean:
 
 @pytest.mark.parametrize("what", ["object", "material", "mesh"])
 def test_something_that_changes_in_every_frame(what: str) -> None:
-    """A block that goes to and fro, is recoloured, or breathes: after 12 frames the light is that of a scene that never changed."""
+    """A block goes to and fro, is recoloured, or breathes: after 12 frames the light is that of a scene that never changed."""
     scene = room(box((-0.2, -0.2, -1), (0.2, 0.2, -0.2)))
 
     def place(frame: int) -> Any:

@@ -16,8 +16,9 @@ constexpr float kFarthest = 0.04f;  // of the ray's length: how far look-ups may
 constexpr float kEnough = 0.01f;    // share of the light that the levels above need not bring
 
 constexpr size_t kFewProbes = 64;  // fewer paths do not tell what an edit changed
-constexpr uint32_t kEven = 1024;   // samples from which on a cell shows no blotches
-constexpr size_t kGroup = 32;      // questions whose cells are fetched from memory together
+constexpr float kRounding = 1e-3f;
+constexpr uint32_t kEven = 1024;  // samples from which on a cell shows no blotches
+constexpr size_t kGroup = 32;     // questions whose cells are fetched from memory together
 constexpr size_t kFillBlock = 1024;
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
@@ -26,6 +27,12 @@ uint64_t lost(const TableCounts& counts) { return counts.refused + counts.evicte
 
 /// Cells of few samples are blotches; look-ups that scatter farther make fine grain of them, which filters take away.
 float widened(uint32_t count) { return std::clamp(std::sqrt(float(kEven) / float(count + 1)), 1.0f, 6.0f); }
+
+/// The same but for rounding, which differs where the scene's triangles were put in another order; no number is unlike.
+bool alike(const Rgb& a, const Rgb& b) {
+  const Rgb off = glm::abs(a - b), most = kRounding * glm::max(a, b);
+  return off.x <= most.x && off.y <= most.y && off.z <= most.z;
+}
 
 /// From blue over green to red.
 Rgb scale_color(float t) {
@@ -49,7 +56,7 @@ void Cache::clear(const CommittedScene& scene) {
   counts_.resets++;
   renders_ = stamp_ = 0;
   forgotten_.clear();
-  pending_ = false;
+  pending_ = loaded_ = false;
 }
 
 void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Work& work) {
@@ -58,8 +65,9 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   const InstanceMask shown = work.shown ? *work.shown : InstanceMask{};
   const bool elsewhere = stale_ || changes.everything || changes.origin || shown != shown_instances_ ||
                          !grid_.serves(scene.scene.bounds());
-  const bool edit = pending_ || !seen.empty();
+  bool edit = pending_ || !seen.empty();
   shown_instances_ = shown;
+  if (!elsewhere && !edit) edit = !validate(scene, work);
   if (elsewhere || (edit && (!settings_.keep || healing_.probe_count() < kFewProbes))) {
     clear(scene);
   } else if (edit) {
@@ -70,6 +78,25 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   seed_ = hash(hash(uint32_t(work.seed), uint32_t(work.seed >> 32)), renders_++, 0x48617368u);  // never a path twice
   next_pass();
   pass_ = work.pass;
+}
+
+/// Whether a few of the kept paths, all of them in turn, bring the light that they brought; those of a loaded cache are
+/// walked at once. Where one does not, the scene is another than the cells', although nobody said so.
+bool Cache::validate(const CommittedScene& scene, const Work& work) {
+  const double begun = now();
+  const std::vector<Probe> probes =
+      healing_.next_probes(settings_.validate && loaded_ ? Healing::kProbes : settings_.validate);
+  RayCounts rays;
+  const std::vector<Rgb> light =
+      walk_again(walk_scene(scene), {grid_, table_, healing_}, settings_.caching, probes, work, rays);
+  if (light.size() < probes.size()) return true;  // stopped: the next update does it
+  loaded_ = false;
+  bool same = true;
+  for (size_t i = 0; i < probes.size(); ++i) same &= alike(probes[i].light, light[i]);
+  counts_.validated += probes.size(), counts_.unannounced += !same;
+  counts_.rays += rays.bounce, counts_.shadow_rays += rays.shadow;
+  counts_.seconds_validate += now() - begun;
+  return same;
 }
 
 void Cache::next_pass() {

@@ -17,6 +17,7 @@ struct CacheSettings {
   float jitter = 0.5f;      // of look-ups, in cell widths (s_j)
   float trusted = 32.0f;    // samples from which on a cell answers alone
   float enough = 128.0f;    // samples from which on a cell gets paths more rarely
+  uint32_t validate = 96;   // kept paths that are walked again in every update without edits
   uint32_t keep = 0;        // samples that old light counts for at most when the scene changes; 0: starts anew
   size_t limit = size_t(1) << 30;
   View view = View::kLight;
@@ -24,8 +25,8 @@ struct CacheSettings {
 
 struct CacheCounts {
   uint64_t paths = 0, samples = 0, cells = 0, rays = 0, shadow_rays = 0, dropped = 0, holes = 0, resets = 0, edits = 0,
-           walked_again = 0;
-  double seconds_paths = 0.0, seconds_table = 0.0, seconds_edits = 0.0;
+           walked_again = 0, validated = 0, unannounced = 0;
+  double seconds_paths = 0.0, seconds_table = 0.0, seconds_edits = 0.0, seconds_validate = 0.0;
 };
 
 class Cache {
@@ -68,6 +69,7 @@ class Cache {
   WalkScene walk_scene(const CommittedScene&) const;
   void clear(const CommittedScene&);
   void edited(const CommittedScene&, const SceneChanges&, const Work&);
+  bool validate(const CommittedScene&, const Work&);
   void next_pass();
   bool open(const CachePoint&) const;
   Rgb shown(const Known&, const CachePoint&, int level) const;
@@ -80,6 +82,7 @@ class Cache {
   Healing healing_;
   std::vector<uint32_t> forgotten_;  // objects, of edits that no path was walked again for yet
   bool pending_ = false;             // there are such edits
+  bool loaded_ = false;              // nobody has seen yet whether the cells fit the scene
   InstanceMask shown_instances_;
   uint32_t seed_ = 0, renders_ = 0, stamp_ = 0, pass_ = 0;
   uint64_t lost_before_ = 0;  // cells that went or were refused before this render

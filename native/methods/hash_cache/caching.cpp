@@ -223,9 +223,10 @@ Rgb direct_light(const PathInput& in, const CachePoint& p, float u_light, const 
   return in.walk.scene.rays.occluded(ray) ? Rgb(0.0f) : arriving;
 }
 
+/// Never inlined: a path that is walked again must be the same to the last bit, so both are walked by the same code.
 template <uint32_t kFeatures>
-void walk_from(const PathInput& in, const Walker<kFeatures>& walker, const CachePoint& p, StoringVisitor& visitor,
-               RayCounts& counts) {
+[[gnu::noinline]] void walk_from(const PathInput& in, const Walker<kFeatures>& walker, const CachePoint& p,
+                                 StoringVisitor& visitor, RayCounts& counts) {
   Sampler sampler(hash_of(p, in.seed), p.sample);
   const Vec2 u = sampler.next2();
   PathState path;

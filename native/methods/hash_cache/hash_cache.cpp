@@ -46,6 +46,7 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_resolution") s.resolution = float(number_of(value) * number_of(value));
       if (name == "hash_jitter") s.jitter = float(number_of(value));
       if (name == "hash_trusted") s.trusted = float(number_of(value));
+      if (name == "hash_validate") s.validate = uint32_t(integer_of(value));
       if (name == "hash_keep") s.keep = uint32_t(integer_of(value));
       if (name == "hash_memory") s.limit = size_t(number_of(value) * 1048576.0);
       if (name == "hash_filter") filter_ = integer_of(value) != 0;
@@ -93,11 +94,14 @@ class HashCache final : public IndirectMethod {
              {"cache_resets", double(c.resets)},
              {"cache_edits", double(c.edits)},
              {"cache_paths_again", double(c.walked_again)},
+             {"cache_validated", double(c.validated)},
+             {"cache_unannounced", double(c.unannounced)},
              {"cache_ratio", double(luminance(cache_.healing().whole().ratio))},
              {"cache_unexplained", double(cache_.healing().whole().unexplained)},
              {"cache_bytes", double(cache_.table().bytes())},
              {"cache_edit_bytes", double(cache_.healing().bytes())},
              {"seconds_edits", c.seconds_edits},
+             {"seconds_validate", c.seconds_validate},
              {"seconds_paths", c.seconds_paths},
              {"seconds_table", c.seconds_table}},
             warning.empty() ? std::vector<std::string>{} : std::vector<std::string>{warning}};
@@ -157,16 +161,21 @@ MethodDescription describe() {
       "it "
       "may, and by how much light changed. 0: an edit starts anew",
       "", int64_t(kKeep), 0.0, 1e6);
+  add("hash_validate", "Validated Paths",
+      "Kept paths that are walked again in every frame without an edit; where one brings other light, cells heal as "
+      "after "
+      "an edit, and a cache that was loaded into a changed scene does so at once. 0: none",
+      "", int64_t(96), 0.0, 4096.0);
   add("hash_memory", "Memory", "Most memory for cells; beyond, those without new samples for longest make room", "MiB",
       1024.0, 1.0, 1e6);
   add("hash_view", "View", "LIGHT, or what the cells hold: LEVEL, COUNT, AGE, SIDE", "", std::string("LIGHT"), 0.0,
       0.0);
   d.debug_views = {"LEVEL", "COUNT", "AGE", "SIDE"};
   d.statistics = {
-      "cells",         "cells_new",         "cells_evicted", "cells_refused",     "cells_updated", "cache_samples",
-      "cache_paths",   "cache_holes",       "cache_rays",    "cache_shadow_rays", "cache_dropped", "cache_resets",
-      "cache_edits",   "cache_paths_again", "cache_ratio",   "cache_unexplained", "cache_bytes",   "cache_edit_bytes",
-      "seconds_edits", "seconds_paths",     "seconds_table"};
+      "cells",       "cells_new",         "cells_evicted",   "cells_refused",     "cells_updated", "cache_samples",
+      "cache_paths", "cache_holes",       "cache_rays",      "cache_shadow_rays", "cache_dropped", "cache_resets",
+      "cache_edits", "cache_paths_again", "cache_validated", "cache_unannounced", "cache_ratio",   "cache_unexplained",
+      "cache_bytes", "cache_edit_bytes",  "seconds_edits",   "seconds_validate",  "seconds_paths", "seconds_table"};
   return d;
 }
 

@@ -94,7 +94,7 @@ uint32_t samples_worth(uint32_t samples, float doubt) {
 
 void Healing::clear() {
   probes_.clear();
-  used_ = 0;
+  used_ = next_ = 0;
   edits_.clear();
   whole_ = Change{};
 }
@@ -110,6 +110,19 @@ void Healing::keep(const Grid& grid, std::span<const Probe> found) {
     place = p;
     place.seed |= !place.seed;
   }
+}
+
+std::vector<Probe> Healing::next_probes(size_t most) {
+  std::vector<Probe> next;
+  for (size_t seen = 0; seen < probes_.size() && next.size() < most; ++seen, next_ = (next_ + 1) % kProbes)
+    if (probes_[next_].seed) next.push_back(probes_[next_]);
+  return next;
+}
+
+void Healing::restore(uint32_t place, const Probe& probe) {
+  if (probes_.empty()) probes_.resize(kProbes);
+  used_ += !probes_[place].seed;
+  probes_[place] = probe;
 }
 
 void Healing::edit(const Grid& grid, std::span<const Rgb> now, std::vector<uint32_t> forgotten, uint32_t stamp,

@@ -57,6 +57,10 @@ class Healing {
   /// The probes, those without light included (seed 0).
   std::span<const Probe> probes() const { return probes_; }
   size_t probe_count() const { return used_; }
+  /// The next so many of them, all in turn: for walking a few again in every frame.
+  std::vector<Probe> next_probes(size_t most);
+  /// Of a saved cache, into an empty place.
+  void restore(uint32_t place, const Probe&);
   /// The scene was edited before pass `stamp`: `now` is the probes' light since, one each. Cells of `forgotten`
   /// objects, sorted, know nothing any more. No cell counts for more than `most` samples.
   void edit(const Grid&, std::span<const Rgb> now, std::vector<uint32_t> forgotten, uint32_t stamp, uint32_t most);
@@ -94,7 +98,7 @@ class Healing {
   static Change change_at(const Edit&, const Cell&);
 
   std::vector<Probe> probes_;
-  size_t used_ = 0;
+  size_t used_ = 0, next_ = 0;
   std::deque<Edit> edits_;
   Change whole_;
   uint32_t stamp_ = 0;
