@@ -87,6 +87,8 @@ void ShortRays::walk(const ShortRayPlace& place, uint32_t index, std::vector<Sto
     stop.normal = pack_direction(point.normal), stop.face_normal = pack_direction(point.face_normal);
     for (int side : {0, 1}) stop.weight[side] = pack_color(throughput * albedo[side]);
     stop.walk = uint16_t(index), stop.depth = uint8_t(depth);
+    stop.choice = uint16_t(sampler_at(place, index, depth, kGroupChoice).next1() * 65536.0f);
+    stop.flags = Stop::kLampStale;
     const bool back = u_side * (weight[0] + weight[1]) >= weight[0];
     throughput *= albedo[back] * ((weight[0] + weight[1]) / weight[back]);
     (back ? transmitted : reflected)++;
@@ -110,16 +112,16 @@ void ShortRays::find_light(const ShortRayPlace& place, Stop& stop, RayCounts& co
   Sampler sampler = sampler_at(place, stop.walk, stop.depth, kLamp);
   const Vec2 u = sampler.next2();
   const float u_lamp = sampler.next1(), u_light = sampler.next1();
-  SurfacePoint point;
-  point.position = stop.position, point.error = stop.error;
-  point.normal = unpack_direction(stop.normal), point.face_normal = unpack_direction(stop.face_normal);
-  Rgb found = from_emitters(point, stop, u_lamp, u, counts);
-  if (stop.left)
-    found += from_lights(place, stop, u_light, counts);
-  else
-    stop.chosen = kNone, stop.flags &= uint8_t(~Stop::kLightKnown);
+  if (stop.flags & Stop::kLampStale) {
+    SurfacePoint point;
+    point.position = stop.position, point.error = stop.error;
+    point.normal = unpack_direction(stop.normal), point.face_normal = unpack_direction(stop.face_normal);
+    stop.lamp_light = pack_color(from_emitters(point, stop, u_lamp, u, counts));
+  }
+  Rgb found = unpack_color(stop.lamp_light);
+  if (stop.left) found += from_lights(stop, u_light, counts);
   stop.light = is_finite(found) ? glm::max(found, Rgb(0.0f)) : Rgb(0.0f);
-  stop.flags &= uint8_t(~Stop::kStale);
+  stop.flags &= uint8_t(~(Stop::kStale | Stop::kLampStale));
 }
 
 /// The first surface that light does not go straight through.
@@ -187,24 +189,23 @@ Rgb ShortRays::from_emitters(const SurfacePoint& point, Stop& stop, float u_ligh
 }
 
 /// Two groups as far from each other as can be; each is as likely as the others.
-void ShortRays::groups(const ShortRayPlace& place, const Stop& stop, uint32_t (&found)[kGroups]) const {
+void ShortRays::groups(const Stop& stop, uint32_t (&found)[kGroups]) const {
   const uint32_t all = (slots(stop) + kGroup - 1) / kGroup;
-  const float step = std::max(float(all) / float(kGroups), 1.0f);
-  const float u = sampler_at(place, stop.walk, stop.depth, kGroupChoice).next1();
+  const float step = std::max(float(all) / float(kGroups), 1.0f), u = (float(stop.choice) + 0.5f) * 0x1p-16f;
   for (uint32_t i = 0; i < kGroups; ++i) found[i] = std::min(uint32_t((u + float(i)) * step), all - 1);
 }
 
 /// What the virtual lights send through here, by one of them: of two groups of slots, which depend on nothing else, the
 /// one that is chosen by what it would bring unhidden (resampling, Talbot et al. 2005). Lights of other groups can do
 /// what they want.
-Rgb ShortRays::from_lights(const ShortRayPlace& place, Stop& stop, float u, RayCounts& counts) const {
+Rgb ShortRays::from_lights(Stop& stop, float u, RayCounts& counts) const {
   const uint32_t before = stop.flags & Stop::kLightKnown ? stop.chosen : kNone, most = slots(stop);
   stop.flags &= uint8_t(~Stop::kLightKnown);
   stop.chosen = kNone;
   const bool behind = stop.flags & Stop::kBack;
   const Vec3 normal = unpack_direction(stop.normal) * (behind ? -1.0f : 1.0f);
   uint32_t group[kGroups];
-  groups(place, stop, group);
+  groups(stop, group);
   float terms[kGroups * kGroup], brings[kGroups * kGroup];
   uint32_t count = 0;
   float all = 0.0f;

@@ -25,7 +25,8 @@ struct ShortRayStop {
   enum Flags : uint8_t {
     kBack = 1,         // the walk goes on behind the surface
     kGoesOn = 2,       // a further ray left from here
-    kStale = 4,        // light has to be found anew, of what is known and what is not
+    kStale = 4,        // the virtual light has to be chosen anew, or its way be asked again
+    kLampStale = 32,   // the same of the lamp
     kLampKnown = 8,    // how much passes between here and lamp_end
     kLightKnown = 16,  // how much passes between here and the chosen virtual light
   };
@@ -35,9 +36,11 @@ struct ShortRayStop {
   uint32_t weight[2] = {0, 0};           // packed: albedo of both sides times what came so far
   Vec3 lamp_end{0.0f};
   uint32_t chosen = kNone;
-  Rgb light{0.0f};
+  uint32_t lamp_light = 0;      // packed: what the lamp sends
+  Rgb light{0.0f};              // with it, all that is sent
   uint16_t passes[2] = {0, 0};  // of the lamp and the virtual light, packed
   uint16_t walk = 0;
+  uint16_t choice = 0;  // of the groups of virtual lights
   uint8_t depth = 0;
   uint8_t left = 0;  // bounces whose virtual lights are asked
   uint8_t flags = 0;
@@ -62,13 +65,13 @@ class ShortRays {
                  Vec3& out) const;
   /// Virtual lights come in groups of sixteen slots; those that a stop chooses from. Twice the same: one.
   static constexpr uint32_t kGroup = 16, kGroups = 2;
-  void groups(const ShortRayPlace&, const ShortRayStop&, uint32_t (&found)[kGroups]) const;
+  void groups(const ShortRayStop&, uint32_t (&found)[kGroups]) const;
 
  private:
   uint32_t slots(const ShortRayStop& stop) const {
     return stop.left < plan_.first.size() ? plan_.first[stop.left] : plan_.slots;
   }
-  Rgb from_lights(const ShortRayPlace&, ShortRayStop&, float u, RayCounts&) const;
+  Rgb from_lights(ShortRayStop&, float u, RayCounts&) const;
   Rgb from_emitters(const SurfacePoint&, ShortRayStop&, float u_light, const Vec2& u, RayCounts&) const;
   bool meet(Ray&, const Vec3& from, float u, PathContext&, SurfacePoint&, Surface&, Rgb& throughput, RayCounts&) const;
 

@@ -316,10 +316,10 @@ void Cache::mark_nearby(const CommittedScene& scene, const SceneChanges& changes
                         Work& work) {
   std::vector<Obstacle> obstacles;
   for (const Moved& m : moved) {
-    if (m.before.present()) obstacles.emplace_back(m.before, m.in_place, true);
-    if (m.after.present() && !m.in_place) obstacles.emplace_back(m.after, true, false);
+    if (m.before.present()) obstacles.emplace_back(m.before, m.in_place, true, m.opaque);
+    if (m.after.present() && !m.in_place) obstacles.emplace_back(m.after, true, false, false);
   }
-  for (const Bounds& bounds : placement_.repainted(scene, changes)) obstacles.emplace_back(bounds, true, true);
+  for (const Bounds& bounds : placement_.repainted(scene, changes)) obstacles.emplace_back(bounds, true, true, false);
   const bool many = obstacles.size() > kManyObstacles;
   light_changes_.lamps = std::exchange(lamps_version_, scene.lights.version()) != scene.lights.version();
   if (!many && obstacles.empty() && !light_changes_.any && !light_changes_.lamps) return;

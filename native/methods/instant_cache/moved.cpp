@@ -144,7 +144,8 @@ std::vector<Moved> Placement::update(const CommittedScene& committed, const Scen
         now.bounds.parts = parts;
         if (shape_stays) before.bounds.parts = parts;
       }
-      moved.push_back({i, before.handle ? before.bounds : Bounds{}, now.bounds, keeps, !placed_otherwise});
+      moved.push_back({i, before.handle ? before.bounds : Bounds{}, now.bounds, keeps, !placed_otherwise,
+                       !before.lets_light_through});
     }
     before = std::move(now);
   }

@@ -31,6 +31,7 @@ struct Moved {
   Bounds before, after;
   bool keeps_places = false;  // the same triangles, elsewhere: places on them can follow
   bool in_place = false;      // nothing but what light passes changed
+  bool opaque = false;        // as it stood before, wholly
 };
 
 class Placement {

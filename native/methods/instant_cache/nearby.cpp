@@ -23,8 +23,13 @@ ShortRayPlace short_ray_place(const Record& r) {
   return {r.position, r.normal, r.face_normal, r.error, seed};
 }
 
-Obstacle::Obstacle(const Bounds& bounds, bool came, bool left)
-    : to_object_(bounds.to_object), half_(0.5f * bounds.box.size()), world_(bounds.world), came_(came), left_(left) {
+Obstacle::Obstacle(const Bounds& bounds, bool came, bool left, bool opaque)
+    : to_object_(bounds.to_object),
+      half_(0.5f * bounds.box.size()),
+      world_(bounds.world),
+      came_(came),
+      left_(left),
+      opaque_(opaque) {
   const Affine& m = to_object_;
   stretch_ = glm::abs(m.x) + glm::abs(m.y) + glm::abs(m.z);
   half_ += kRounding * glm::abs(m.p);
@@ -79,15 +84,16 @@ void NearbyTable::mark(size_t index, const Record& record, const ShortRays& rays
   float error = record.error;
   for (Stop& stop : row.stops) {
     error = std::max(error, stop.error);
-    bool stale = changes.lamps;
+    uint8_t stale = changes.lamps ? Stop::kLampStale : 0;
     if (changes.any && stop.left) {
       if (stop.flags & Stop::kLightKnown && changes.moved[stop.chosen / 64] >> (stop.chosen % 64) & 1)
         stop.flags &= uint8_t(~Stop::kLightKnown);
       uint32_t groups[ShortRays::kGroups];
-      rays.groups(place, stop, groups);
-      for (const uint32_t group : groups) stale |= changes.grouped[group] != 0;
+      rays.groups(stop, groups);
+      for (const uint32_t group : groups)
+        if (changes.grouped[group]) stale |= Stop::kStale;
     }
-    if (stale) stop.flags |= Stop::kStale, row.stale = true;
+    if (stale) stop.flags |= stale, row.stale = true;
   }
   if (obstacles.empty()) return;
   const float slack = 2.0f * error;
@@ -98,14 +104,15 @@ void NearbyTable::mark(size_t index, const Record& record, const ShortRays& rays
     });
   };
   for (Stop& stop : row.stops) {
-    const uint8_t before = stop.flags;
-    if (before & Stop::kLampKnown && changed(stop, stop.lamp_end, 0.0f, stop.passes[0]))
-      stop.flags &= uint8_t(~Stop::kLampKnown);
+    uint8_t stale = 0;
+    if (stop.flags & Stop::kLampKnown && changed(stop, stop.lamp_end, 0.0f, stop.passes[0]))
+      stop.flags &= uint8_t(~Stop::kLampKnown), stale |= Stop::kLampStale;
     if (stop.flags & Stop::kLightKnown) {
       const VirtualLight& light = lights.lights[stop.chosen];
-      if (changed(stop, light.position, 2.0f * light.lift, stop.passes[1])) stop.flags &= uint8_t(~Stop::kLightKnown);
+      if (changed(stop, light.position, 2.0f * light.lift, stop.passes[1]))
+        stop.flags &= uint8_t(~Stop::kLightKnown), stale |= Stop::kStale;
     }
-    if (stop.flags != before) stop.flags |= Stop::kStale, row.stale = true;
+    if (stale) stop.flags |= stale, row.stale = true;
   }
 }
 
@@ -120,9 +127,10 @@ void NearbyTable::mark_walks(size_t index, const ShortRayPlace& place, const Sho
   for (const Obstacle& o : obstacles)
     if (o.near(place.position, far)) near.push_back(&o);
   if (near.empty()) return;
-  const auto crossed = [&](const Vec3& from, const Vec3& to) {
-    return std::any_of(near.begin(), near.end(), [&](const Obstacle* o) { return o->crosses(from, to, slack); });
+  const auto turned = [&](const Vec3& from, const Vec3& to, bool met) {
+    return std::any_of(near.begin(), near.end(), [&](const Obstacle* o) { return o->turns(from, to, met, slack); });
   };
+  const float reach = rays.reach() + slack;
   size_t at = 0;
   for (uint32_t walk = 0; walk < rays.count(); ++walk) {
     Vec3 from = place.position, around = place.normal, face = place.face_normal;
@@ -130,15 +138,17 @@ void NearbyTable::mark_walks(size_t index, const ShortRayPlace& place, const Sho
     uint32_t depth = 1;
     for (; at < row.stops.size() && row.stops[at].walk == walk; ++at, ++depth) {
       const Stop& stop = row.stops[at];
-      touched |= crossed(from, stop.position);
+      touched |= turned(from, stop.position, true);
       const float side = stop.flags & Stop::kBack ? -1.0f : 1.0f;
       from = stop.position;
       around = side * unpack_direction(stop.normal), face = side * unpack_direction(stop.face_normal);
       goes_on = stop.flags & Stop::kGoesOn;
     }
-    if (goes_on && !touched) {
+    if (goes_on && !touched &&
+        std::any_of(near.begin(), near.end(), [&](const Obstacle* o) { return o->near(from, reach); })) {
       Vec3 way;
-      if (rays.direction(place, walk, depth, around, face, way)) touched = crossed(from, from + rays.reach() * way);
+      if (rays.direction(place, walk, depth, around, face, way))
+        touched = turned(from, from + rays.reach() * way, false);
     }
     if (touched) again(index)[walk / 64] |= uint64_t(1) << (walk % 64), row.stale = true;
   }
@@ -163,7 +173,7 @@ Rgb NearbyTable::repair(size_t index, const ShortRays& rays, const Record& recor
     std::fill_n(marked, words_, uint64_t(0));
   }
   for (Stop& stop : row.stops)
-    if (stop.flags & Stop::kStale) rays.find_light(place, stop, counts);
+    if (stop.flags & (Stop::kStale | Stop::kLampStale)) rays.find_light(place, stop, counts);
   row.known = true, row.stale = false;
   return rays.sum(row.stops);
 }

@@ -23,11 +23,17 @@ struct LightChanges {
 /// Bounds of an object that came, went or looks otherwise. Ways are tested by separating axes.
 class Obstacle {
  public:
-  /// came, left: what became of light on ways through it.
-  Obstacle(const Bounds&, bool came, bool left);
+  /// came, left: what became of light on ways through it. opaque: it was, and if it left, rays that met something else
+  /// still do.
+  Obstacle(const Bounds&, bool came, bool left, bool opaque);
   /// slack: how far from both ends the ray may really begin and end.
   bool crosses(const Vec3& from, const Vec3& to, float slack) const;
   bool near(const Vec3& center, float radius) const;
+  /// Whether a ray from there can meet something else than it did; met: it met anything.
+  bool turns(const Vec3& from, const Vec3& to, bool met, float slack) const {
+    if (came_ || !opaque_) return crosses(from, to, slack);
+    return met && near(to, slack) && crosses(to, to, slack);
+  }
   /// Whether it can change what passes on a way that it crosses; now: packed transmittance.
   bool matters(uint16_t now) const { return (came_ && now) || (left_ && now != 0xffff); }
 
@@ -35,7 +41,7 @@ class Obstacle {
   Affine to_object_;  // its middle is the origin
   Vec3 half_, stretch_;
   Box world_;
-  bool came_, left_;
+  bool came_, left_, opaque_;
 };
 
 class NearbyTable {
