@@ -13,6 +13,7 @@ namespace afterglow {
 namespace {
 
 constexpr float kMostSmoothing = 1.5f;  // standard errors
+constexpr float kUnseen = 1e-4f;        // relative change around a pixel that is no more than rounding
 
 uint32_t stored_floats(Pass pass) {
   switch (pass) {
@@ -72,13 +73,15 @@ Film::Film(const FilmSettings& settings)
 
 size_t Film::bytes() const {
   return (sums_.size() + squares_.size()) * sizeof(float) + (counts_.size() + extras_.size()) * sizeof(uint32_t) +
-         locks_.size() + (carry_ ? carry_->bytes() : 0);
+         sight_.size() * sizeof(Sight) + locks_.size() + (carry_ ? carry_->bytes() : 0);
 }
 
 void Film::clear() {  // sums without samples are never read: they need no zeros
   std::fill(counts_.begin(), counts_.end(), 0u);
   std::fill(extras_.begin(), extras_.end(), 0u);
   std::fill(squares_.begin(), squares_.end(), 0.0f);
+  std::fill(sight_.begin(), sight_.end(), Sight{});
+  looked_ = 0;
   if (carry_) carry_->clear();
   asking_ = false;
   sample_ = 0;
@@ -93,8 +96,47 @@ void Film::keep_noise() {
 PixelNoise Film::noise(size_t pixel) const {
   const Lock lock(*this, pixel);
   if (!counts_[pixel]) return {};
-  const float* c = sums_.data() + pixel * size_t(layout_.floats) + size_t(layout_[Pass::kCombined]);
-  return {luminance(Rgb(c[0], c[1], c[2])), squares_[pixel], counts_[pixel], extras_[pixel]};
+  const float* sums = sums_.data() + pixel * size_t(layout_.floats);
+  const float* c = sums + layout_[Pass::kCombined];
+  const float seen = keeps_sight() ? luminance(this->seen(sums)) : 0.0f;
+  PixelNoise noise{.sum = luminance(Rgb(c[0], c[1], c[2])) - seen, .seen = seen, .samples = counts_[pixel]};
+  if (keeps_noise()) noise.squares = squares_[pixel], noise.extra = extras_[pixel];
+  return noise;
+}
+
+void Film::keep_sight() {
+  if (!keeps_sight()) sight_.resize(counts_.size());
+}
+
+void Film::see(uint32_t x, uint32_t y, const Rgb& emission, const Rgb& environment, uint32_t samples) {
+  const size_t pixel = size_t(y - settings_.y0) * width() + (x - settings_.x0);
+  const Lock lock(*this, pixel);
+  Sight& sight = sight_[pixel];
+  sight.emission += emission, sight.environment += environment, sight.samples += samples;
+}
+
+Rgb Film::seen(const float* sums) const {
+  const float* emission = sums + layout_[Pass::kEmission];
+  const float* sky = sums + layout_[Pass::kEnvironment];
+  const float share = settings_.transparent ? 0.0f : 1.0f;  // a transparent film shows no sky
+  return Rgb(emission[0] + share * sky[0], emission[1] + share * sky[1], emission[2] + share * sky[2]);
+}
+
+/// Puts the mean over all rays in the place of the samples' own.
+void Film::add_sight(Pass pass, const Sight& sight, const float* sums, uint32_t samples, float* out) const {
+  if (!sight.samples || !samples) return;
+  const auto add = [&](Pass from, const Rgb& sum) {
+    const float* own = sums + layout_[from];
+    for (int c = 0; c < 3; ++c) {
+      const float all = (own[c] + sum[c]) / float(samples + sight.samples);
+      out[c] += (all - own[c] / float(samples)) * settings_.exposure;
+    }
+  };
+  const bool combined = pass == Pass::kCombined;
+  if (combined || pass == Pass::kEmission) add(Pass::kEmission, sight.emission);
+  if (pass == Pass::kEnvironment || (combined && !settings_.transparent)) add(Pass::kEnvironment, sight.environment);
+  if (combined)
+    for (int c = 0; c < 3; ++c) out[c] = std::max(0.0f, out[c]);  // of rounding
 }
 
 void Film::add(uint32_t x, uint32_t y, const float* sums, uint32_t samples, float squares, bool extra) {
@@ -245,12 +287,13 @@ void Film::settle(size_t pixel) {
   const Lock lock(*this, pixel);
   float* to = sums_.data() + pixel * size_t(layout_.floats);
   const uint32_t before = counts_[pixel], kept = before ? samples_kept(before, carry_->change(pixel)) : 0;
+  if (keeps_sight() && carry_->change(pixel) > kUnseen && sight_[pixel].samples) sight_[pixel] = {}, looked_ = 0;
   if (kept) {
     keep(pixel, kept, carry_->found(pixel).cached);
   } else {
     std::memcpy(to, carry_->sums(pixel), size_t(layout_.floats) * sizeof(float));
     const float* c = to + layout_[Pass::kCombined];
-    const float light = luminance(Rgb(c[0], c[1], c[2]));
+    const float light = luminance(Rgb(c[0], c[1], c[2]) - (keeps_sight() ? seen(to) : Rgb(0.0f)));
     counts_[pixel] = 1;
     squares_[pixel] = light * light;
   }
@@ -322,7 +365,9 @@ void Film::read_edited(size_t pixel, size_t asked, float* out) const {
     std::fill_n(out, 4, 0.0f);
     return;
   }
-  read_pixel(Pass::kCombined, sums_.data() + pixel * size_t(layout_.floats), counts_[pixel], out);
+  const float* sums = sums_.data() + pixel * size_t(layout_.floats);
+  read_pixel(Pass::kCombined, sums, counts_[pixel], out);
+  if (keeps_sight()) add_sight(Pass::kCombined, sight_[pixel], sums, counts_[pixel], out);
   const Rgb& more = carry_->found(asked).cached;
   const Rgb smooth = carry_->smoothing(pixel);
   for (int c = 0; c < 3; ++c) out[c] = std::max(0.0f, out[c] + (more[c] + smooth[c]) * settings_.exposure);
@@ -333,7 +378,7 @@ float Film::spread() const {
   const size_t pixels = counts_.size();
   for (size_t p = 0; p < pixels; ++p) {
     const PixelNoise n = noise(p);
-    mean += n.samples ? double(n.sum) / n.samples : 0.0;
+    mean += n.samples ? double(n.sum + n.seen) / n.samples : 0.0;
   }
   mean /= double(std::max<size_t>(pixels, 1));
   if (!(mean > 0.0)) return 0.0f;
@@ -342,7 +387,8 @@ float Film::spread() const {
     const PixelNoise n = noise(p);
     if (n.samples < 2) continue;
     const double m = exposure * n.sum / n.samples, square = exposure * exposure * n.squares / n.samples;
-    total += std::max(0.0, square - m * m) / (n.samples - 1) / (m * m + 0.01);
+    const double level = exposure * (n.sum + n.seen) / n.samples;
+    total += std::max(0.0, square - m * m) / (n.samples - 1) / (level * level + 0.01);
   }
   return float(std::sqrt(total / double(pixels)));
 }
@@ -368,13 +414,16 @@ void Film::read_row(Pass pass, float* out, uint32_t y, uint32_t step) const {
     }
     const size_t pixel = y * w + x;
     uint32_t samples;
+    Sight sight;
     {
       const Lock lock(*this, pixel);
+      if (keeps_sight()) sight = sight_[pixel];
       std::memcpy(sums.data(), sums_.data() + pixel * size_t(layout_.floats), size_t(layout_.floats) * sizeof(float));
       samples = pass == Pass::kBatches ? in_batches(pixel) : counts_[pixel];
     }
     if (!samples) sums.fill(0.0f);
     read_pixel(pass, sums.data(), samples, to);
+    add_sight(pass, sight, sums.data(), samples, to);
     if (!carry_ || pass != Pass::kCombined || !samples) continue;
     const Rgb& smooth = carry_->smoothing(pixel);
     for (int c = 0; c < 3; ++c) to[c] = std::max(0.0f, to[c] + smooth[c] * settings_.exposure);

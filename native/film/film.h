@@ -47,6 +47,7 @@ struct PixelRequest {
 /// What a pixel's samples tell of its noise.
 struct PixelNoise {
   float sum = 0.0f, squares = 0.0f;  // of the samples' luminances
+  float seen = 0.0f;                 // light that stands in neither, because rays of its own see to it
   uint32_t samples = 0, extra = 0;   // all samples, and those of extra requests among them
 };
 
@@ -78,7 +79,17 @@ class Film {
   /// From here on squares of luminances and extra samples are kept, too.
   void keep_noise();
   bool keeps_noise() const { return !squares_.empty(); }
-  PixelNoise noise(size_t pixel) const;
+  PixelNoise noise(size_t pixel) const;  // no squares where none are kept
+  /// From here on light that camera rays meet at emitters and in the sky is the mean of all samples and of what see()
+  /// adds, and no part of the noise: see render/sight.h. Needs kSeenPasses.
+  static constexpr PassSet kSeenPasses = bit(Pass::kEmission) | bit(Pass::kEnvironment);
+  void keep_sight();
+  bool keeps_sight() const { return !sight_.empty(); }
+  void see(uint32_t x, uint32_t y, const Rgb& emission, const Rgb& environment, uint32_t samples);
+  uint32_t sight_samples(size_t pixel) const { return sight_[pixel].samples; }
+  /// How many samples every pixel had when rays last looked; 0: never, or some of what they saw is gone.
+  uint32_t looked() const { return looked_; }
+  void set_looked(uint32_t samples) { looked_ = samples; }
   /// Adds the sums of `samples` samples of one pixel of the full image: layout().floats values. Extra samples stand in
   /// no batch.
   void add(uint32_t x, uint32_t y, const float* sums, uint32_t samples, float squares = 0.0f, bool extra = false);
@@ -119,6 +130,12 @@ class Film {
   uint32_t batch_sums(size_t pixel, float* sums) const;  // returns the samples that stand in batches
   uint32_t in_batches(size_t pixel) const { return counts_[pixel] - (extras_.empty() ? 0u : extras_[pixel]); }
   void read_error(float* out, uint32_t step) const;
+  struct Sight {
+    Rgb emission{0.0f}, environment{0.0f};  // sums
+    uint32_t samples = 0;
+  };
+  Rgb seen(const float* sums) const;
+  void add_sight(Pass, const Sight&, const float* sums, uint32_t samples, float* out) const;
   void read_row(Pass, float* out, uint32_t y, uint32_t step) const;
   void read_pixel(Pass, const float* sums, uint32_t samples, float* out) const;
   void read_edited(size_t pixel, size_t asked, float* out) const;
@@ -131,6 +148,8 @@ class Film {
   std::vector<uint32_t> counts_;
   std::vector<float> squares_;    // empty: no noise is kept
   std::vector<uint32_t> extras_;  // of counts_
+  std::vector<Sight> sight_;      // empty: none is kept
+  std::atomic<uint32_t> looked_{0};
   std::unique_ptr<CarryOver> carry_;
   bool asking_ = false;
   uint32_t sample_ = 0;

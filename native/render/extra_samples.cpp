@@ -15,19 +15,19 @@ constexpr int kHalvings = 24;
 
 /// Sums over 3 × 3 pixels with binomial weights.
 struct Near {
-  float weight = 0.0f, sum = 0.0f, mean_square = 0.0f, variance = 0.0f, known = 0.0f;
+  float weight = 0.0f, sum = 0.0f, level = 0.0f, mean_square = 0.0f, variance = 0.0f, known = 0.0f;
 };
 
 }  // namespace
 
 std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, uint32_t width, uint32_t height) {
   double total = 0.0;
-  uint64_t seen = 0;
+  uint64_t known = 0;
   for (const PixelNoise& p : pixels)
-    if (p.samples) total += double(p.sum) / p.samples, ++seen;
+    if (p.samples) total += double(p.sum + p.seen) / p.samples, ++known;
   std::vector<float> deviations(pixels.size(), 0.0f);
-  if (!seen || !(total > 0.0)) return deviations;
-  const float bright = 2.0f * float(total / double(seen)), floor = 0.01f * bright * bright;
+  if (!known || !(total > 0.0)) return deviations;
+  const float bright = 2.0f * float(total / double(known)), floor = 0.01f * bright * bright;
   for (int y = 0; y < int(height); ++y)
     for (int x = 0; x < int(width); ++x) {
       Near near;
@@ -37,15 +37,16 @@ std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, ui
           if (!p.samples) continue;
           const float w = (i == x ? 2.0f : 1.0f) * (j == y ? 2.0f : 1.0f), n = float(p.samples), mean = p.sum / n;
           near.weight += w, near.sum += w * mean, near.mean_square += w * p.squares / n;
+          near.level += w * (mean + p.seen / n);
           if (p.samples < 2) continue;
           near.known += w;
           near.variance += w * std::max(0.0f, (p.squares - p.sum * mean) / (n - 1.0f));
         }
       if (!(near.weight > 0.0f)) continue;
-      const float mean = near.sum / near.weight;
+      const float mean = near.sum / near.weight, level = near.level / near.weight;
       const float variance =
           near.known > 0.0f ? near.variance / near.known : std::max(0.0f, near.mean_square / near.weight - mean * mean);
-      deviations[size_t(y) * width + size_t(x)] = std::sqrt(variance / (mean * mean + floor));
+      deviations[size_t(y) * width + size_t(x)] = std::sqrt(variance / (level * level + floor));
     }
   return deviations;
 }

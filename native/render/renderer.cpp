@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "base/errors.h"
+#include "render/sight.h"
 
 namespace afterglow {
 
@@ -42,6 +43,12 @@ void Renderer::update(const CommittedScene& scene, Work& work) {
 void Renderer::render(const CommittedScene& scene, std::span<const PixelRequest> requests, Film& film, Work& work) {
   if (method_->traits().terms == kAllTerms) return method_->render(scene, requests, film, work);
   render_wavefronts(*method_, scene, requests, film, work, settings_, times_, wave_);
+}
+
+void Renderer::look(const CommittedScene& scene, Film& film, uint32_t samples, Work& work) {
+  const std::vector<PixelRequest> requests = sight_requests(film, sight_wanted(samples));
+  afterglow::look(scene, requests, film, work, settings_, times_.counts);
+  film.set_looked(samples);
 }
 
 void Renderer::save(const CommittedScene& scene, const std::string& path) const {

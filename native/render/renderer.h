@@ -29,12 +29,16 @@ class Renderer {
   float extra() const { return method_->traits().extra; }
   /// Whether light that the method answers for is without noise, and stands in a pass of its own.
   bool carries() const { return method_->traits().steady; }
+  /// Whether edges of what shines may get rays of their own.
+  bool looks() const { return method_->traits().terms != kAllTerms; }
   bool running() const { return method_->traits().running; }
   void configure(const Settings&);
 
   /// Brings the method up to date with the scene. Not while render() runs.
   void update(const CommittedScene&, Work&);
   void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&);
+  /// Rays that only look, for the film's edges of what shines: see sight.h. `samples`: that every pixel has.
+  void look(const CommittedScene&, Film&, uint32_t samples, Work&);
   MethodStatistics statistics() const;
   /// What the method remembers, into and out of a file. Throw FileError, and InvalidInput where there is nothing to
   /// save or the file belongs to another scene.

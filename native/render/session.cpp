@@ -257,6 +257,8 @@ void Session::run(RenderSettings settings) {
     if (settings.denoise) settings.film.passes |= kDenoisePasses;
     const bool carries = settings.carry_over && renderer.carries();
     if (carries) settings.film.passes |= Film::kCarriedPasses;
+    const bool looks = settings.sight && renderer.looks();
+    if (looks) settings.film.passes |= Film::kSeenPasses;
     std::shared_ptr<Film> film;
     {
       const std::lock_guard lock(mutex_);
@@ -276,6 +278,7 @@ void Session::run(RenderSettings settings) {
       film = std::make_shared<Film>(wanted);
     }
     if (carries) film->carry_over();
+    if (looks) film->keep_sight();
     film_made_for_ = settings;
     film_seen_by_ = scene_->scene.camera();
     {

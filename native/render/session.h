@@ -116,7 +116,7 @@ class Session {
   Camera film_seen_by_;
 
   mutable std::mutex mutex_;  // all below
-  double extra_ = 0.0;  // samples beyond every pixel's own, for each of those
+  double extra_ = 0.0;        // samples beyond every pixel's own, for each of those
   mutable std::condition_variable changed_;
   SessionState state_ = SessionState::kIdle;
   RenderSettings shown_settings_;  // what readers are told about: those of the last start

@@ -21,6 +21,8 @@ constexpr uint32_t kPrefilterFrom = 4;
 /// Pictures of a cache are smooth but for direct light: their first one may take three times as long and be finer.
 constexpr double kFinerStart = 1.0 / 3.0;
 
+/// A viewport's first picture does not wait for rays that only look.
+constexpr uint32_t kLooksFrom = 2;
 /// Passes for the pixels that an edit left without samples, before those are asked that seem untouched.
 constexpr uint32_t kCaughtUp = 6;
 
@@ -128,6 +130,12 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     if (stop_) break;
     if (asks) film.end_asking(plan.step, settings.viewport);
     if (plan.step == 1) done = carries ? least_samples(film) : plan.first + plan.count;
+    const bool looks = film.keeps_sight() && plan.step == 1 && !film.asks() && done >= std::max(1u, 2 * film.looked()) &&
+                       (!settings.viewport || done >= kLooksFrom);
+    double looking = now();
+    if (looks) renderer.look(*scene_, film, done, work);
+    looking = now() - looking;
+    if (stop_) break;
     if (renderer.extra() > 0.0f && plan.step == 1) {
       work.extra = true;
       renderer.render(*scene_, extra_requests(film, renderer.extra()), film, work);
@@ -138,7 +146,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     in_passes += seconds;
     uint64_t samples = 0;
     for (const PixelRequest& request : requests) samples += sample_count(request);
-    if (samples >= kSamplesToTime && !paused_) sample_seconds_ = seconds / double(samples);
+    if (samples >= kSamplesToTime && !paused_) sample_seconds_ = (seconds - looking) / double(samples);
     BelievedError noise;
     const bool due = error_is_due(done) || (done >= 2 && done >= settings.samples);
     if (plan.step == 1 && due) noise = carries ? spread_of(film) : film.believed_error();

@@ -129,6 +129,7 @@ const std::map<std::string, Setter>& setters() {
       {"denoiser_search", [](R& r, const N& n, const V& v) { r.denoiser_search = texts(n, v); }},
       {"viewport", [](R& r, const N& n, const V& v) { r.viewport = number(n, v, 0, 1) != 0; }},
       {"carry_over", [](R& r, const N& n, const V& v) { r.carry_over = number(n, v, 0, 1) != 0; }},
+      {"sight", [](R& r, const N& n, const V& v) { r.sight = number(n, v, 0, 1) != 0; }},
       {"mist", [](R& r, const N& n, const V& v) { set_mist(r.film, n, v); }},
       {"local_view",
        [](R& r, const N& n, const V& v) {
@@ -175,7 +176,7 @@ void RenderSettings::apply(const NamedValues& values) {
 
 bool RenderSettings::same_samples(const RenderSettings& o) const {
   return film == o.film && method == o.method && method_settings == o.method_settings && seed == o.seed &&
-         local_view_set == o.local_view_set && local_view == o.local_view;
+         sight == o.sight && local_view_set == o.local_view_set && local_view == o.local_view;
 }
 
 }  // namespace afterglow

@@ -26,6 +26,7 @@ struct RenderSettings {
   double frame = 0.0;
   uint32_t threads = 0;
   bool viewport = false, denoise = false;
+  bool sight = true;        // edges of what shines get rays of their own, where a cache answers for the rest
   bool carry_over = false;  // samples outlive edits of the scene and, in final renders, frames
   std::string denoiser = "AUTO";
   std::vector<std::string> denoiser_search;  // folders where a copy may lie

@@ -220,7 +220,8 @@ bool show_colours(const FilmLayout& layout, const Wavefront& wave, size_t reques
   if (std::none_of(begin, begin + ptrdiff_t(r.questions.size()), shown_as_it_is)) return false;
   const int at = layout[Pass::kCombined];
   for (size_t pixel = 0; pixel * floats < r.sums.size(); ++pixel)
-    std::fill_n(r.sums.begin() + ptrdiff_t(pixel * floats) + at, 3, 0.0f);
+    for (const Pass pass : {Pass::kCombined, Pass::kEmission, Pass::kEnvironment})
+      if (layout[pass] >= 0) std::fill_n(r.sums.begin() + ptrdiff_t(pixel * floats) + layout[pass], 3, 0.0f);
   for (size_t k = 0; k < r.questions.size(); ++k) {
     const CachePoint& p = wave.points[first + k];
     if (p.layer || p.translucent || !shown_as_it_is(wave.answers[first + k])) continue;

@@ -24,7 +24,8 @@ class AskingVisitor : public path_tracing::FilmVisitor<kPasses> {
   }
 
   void end_path() {
-    if (out_.noise) out_.luminances.push_back(luminance(this->light_));
+    if (out_.noise)
+      out_.luminances.push_back(luminance(this->light_ - (this->in_.film.keeps_sight() ? this->seen_ : Rgb(0.0f))));
     this->end_sample();
   }
 

@@ -222,6 +222,8 @@ class Session:
         pixel_filter "BLACKMAN_HARRIS"|"GAUSSIAN"|"BOX", filter_width; film_transparent; film_exposure
         passes: names of the passes to keep (below); denoise: bool; denoiser "AUTO"|…
         viewport: bool (start coarse: passes at 1/8, 1/4, 1/2 of the resolution first)
+        sight: bool (methods of a cache: rays that end at the first surface tell how much of a pixel at the edge of a window, a lamp
+            or the sky shines; on by default)
         carry_over: bool (methods whose answers have no noise: where an edit, or in final renders what changed since the last
             one, leaves a pixel as it is, its samples stay; `samples` is what every pixel has then; direct light is smoothed)
         mist (start, depth, "quadratic"|"linear"|"inverse_quadratic")

@@ -23,7 +23,7 @@ class FilmVisitor {
   void begin_pixel() { std::memset(sums_, 0, sizeof(float) * size_t(layout_.floats)); }
   void begin_sample(const PathState& path, uint32_t index) {
     batch_ = sums_ + layout_[Pass::kBatches] + int(batch_of(index));
-    light_ = Rgb(0.0f);
+    light_ = seen_ = Rgb(0.0f);
     transparent_ = 0.0f;
     if constexpr (kPasses) {
       eye_ = path.ray.origin;
@@ -100,6 +100,7 @@ class FilmVisitor {
     light_ += c;
     if constexpr (kPasses) {
       if (path.context.depth == 0) {
+        seen_ += c;
         add(Pass::kEmission, c);
         if (!features_known_) add(Pass::kAlbedo, glm::min(c, Rgb(1.0f)));
       } else {
@@ -117,7 +118,7 @@ class FilmVisitor {
       light_ += c;
     if constexpr (kPasses) {
       if (path.context.depth == 0)
-        add(Pass::kEnvironment, c);
+        seen_ += hole ? Rgb(0.0f) : c, add(Pass::kEnvironment, c);
       else
         add_shared(path.context.depth == 1, c);
       if (!features_known_) add(Pass::kAlbedo, glm::min(c, Rgb(1.0f)));
@@ -180,7 +181,7 @@ class FilmVisitor {
   RayCounts& counts_;
   const float least_limit_ = std::fmin(kMostLight, std::fmin(in_.clamp_indirect, in_.clamp_direct));
   float* batch_ = nullptr;
-  Rgb light_{0.0f};
+  Rgb light_{0.0f}, seen_{0.0f};  // seen: of light, what the camera's ray met itself
   float transparent_ = 0.0f;
   Vec3 eye_{0.0f};
   Rgb diffuse_share_{0.0f}, glossy_share_{0.0f}, transmission_share_{0.0f};  // of the first surface's lobes
