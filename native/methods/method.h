@@ -75,6 +75,7 @@ struct Work {
   const std::vector<uint64_t>* shown = nullptr;   // local view: one bit an instance (InstanceMask); null: everything
   const std::atomic<bool>* pause = nullptr;       // while true, no new request is begun
   std::atomic<uint64_t>* samples_done = nullptr;  // grows as requests are finished
+  bool lazy = false;                              // update() may leave to refine() what a first picture can do without
   bool extra = false;  // requests ask for more samples where the picture is noisy: methods answer from what they have
 };
 
@@ -88,8 +89,8 @@ class IndirectMethod {
   virtual ~IndirectMethod() = default;
   virtual MethodTraits traits() const = 0;
   virtual void configure(const Settings&) = 0;  // names that are not its own are left alone
-  virtual void update(const CommittedScene&, const SceneChanges&, Work&) = 0;           // invalidate and repair
-  virtual bool refine(const CommittedScene&, Work&) = 0;                                // one whole pass; false: done
+  virtual void update(const CommittedScene&, const SceneChanges&, Work&) = 0;  // invalidate and repair
+  virtual bool refine(const CommittedScene&, Work&) = 0;  // what update() left; true: answers are others than before
   virtual void prepare(const CommittedScene&, std::span<const CachePoint>, Work&) = 0;  // a wavefront; may insert
   virtual void gather(const CommittedScene&, std::span<const CachePoint>,
                       std::span<Answer>) const = 0;  // pure; any thread

@@ -36,6 +36,8 @@ class Renderer {
 
   /// Brings the method up to date with the scene. Not while render() runs.
   void update(const CommittedScene&, Work&);
+  /// After a first picture: see IndirectMethod.
+  bool refine(const CommittedScene& scene, Work& work) { return method_->refine(scene, work); }
   void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&);
   /// Rays that only look, for the film's edges of what shines: see sight.h. `samples`: that every pixel has.
   void look(const CommittedScene&, Film&, uint32_t samples, Work&);

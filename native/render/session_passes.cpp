@@ -3,6 +3,7 @@
 #include <bit>
 #include <chrono>
 #include <shared_mutex>
+#include <utility>
 
 #include "base/errors.h"
 #include "film/denoise_task.h"
@@ -89,6 +90,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     work.shown = &shown;
   }
   double begun = now();
+  work.lazy = settings.viewport && film.carries();
   renderer.update(*scene_, work);
   {
     const std::lock_guard lock(mutex_);
@@ -174,6 +176,12 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
         publish(settings, film, plan.step, false);
         at_last_publish = now();
       }
+    }
+    if (std::exchange(work.lazy, work.lazy && plan.step > 1) && !work.lazy && renderer.refine(*scene_, work)) {
+      if (stop_) break;
+      film.begin_asking();  // as after an edit
+      caught_up = 0, index = uint32_t(-1);
+      continue;
     }
     if (settings.accuracy > 0.0f && error_may_stop(done) && noise.value >= 0.0f && noise.value <= settings.accuracy)
       break;

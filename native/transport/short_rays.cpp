@@ -12,7 +12,8 @@ namespace afterglow {
 namespace {
 
 constexpr uint32_t kDimensions = 12;  // of a vertex
-constexpr uint32_t kWay = 0, kStraight = 2, kSide = 3, kLamp = 4, kLampChoice = 6, kLight = 7, kGroupChoice = 8;
+// Way and place of the lamp stand in one block: the points of all walks are even in all four dimensions.
+constexpr uint32_t kWay = 0, kLamp = 2, kLight = 5, kSide = 6, kGroupChoice = 8;
 constexpr int kMostPassages = 16;  // transparent surfaces before one that is met
 using Stop = ShortRayStop;
 
@@ -70,8 +71,8 @@ void ShortRays::walk(const ShortRayPlace& place, uint32_t index, std::vector<Sto
     if (!direction(place, index, depth, around, face, ray.direction)) return;
     ray.t_max = reach(), ray.mask = kVisibleDiffuse;
     context.depth = uint16_t(depth);
-    Sampler sampler = sampler_at(place, index, depth, kStraight);
-    const float u_straight = sampler.next1(), u_side = sampler.next1();
+    Sampler sampler = sampler_at(place, index, depth, kSide);
+    const float u_side = sampler.next1(), u_straight = sampler.next1();
     SurfacePoint point;
     Surface surface, diffuse;
     if (!meet(ray, from, u_straight, context, point, surface, throughput, counts)) return;
@@ -109,17 +110,17 @@ void ShortRays::walk(const ShortRayPlace& place, uint32_t index, std::vector<Sto
 }
 
 void ShortRays::find_light(const ShortRayPlace& place, Stop& stop, RayCounts& counts) const {
-  Sampler sampler = sampler_at(place, stop.walk, stop.depth, kLamp);
-  const Vec2 u = sampler.next2();
-  const float u_lamp = sampler.next1(), u_light = sampler.next1();
   if (stop.flags & Stop::kLampStale) {
+    Sampler sampler = sampler_at(place, stop.walk, stop.depth, kLamp);
+    const Vec2 u = sampler.next2();
+    const float u_lamp = sampler.next1();
     SurfacePoint point;
     point.position = stop.position, point.error = stop.error;
     point.normal = unpack_direction(stop.normal), point.face_normal = unpack_direction(stop.face_normal);
     stop.lamp_light = pack_color(from_emitters(point, stop, u_lamp, u, counts));
   }
   Rgb found = unpack_color(stop.lamp_light);
-  if (stop.left) found += from_lights(stop, u_light, counts);
+  if (stop.left) found += from_lights(stop, sampler_at(place, stop.walk, stop.depth, kLight).next1(), counts);
   stop.light = is_finite(found) ? glm::max(found, Rgb(0.0f)) : Rgb(0.0f);
   stop.flags &= uint8_t(~(Stop::kStale | Stop::kLampStale));
 }

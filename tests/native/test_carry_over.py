@@ -87,6 +87,20 @@ def test_samples_outlive_an_edit_and_the_picture_is_the_new_one() -> None:
     assert abs(left) < 0.01, f"{left:.1%} of the old picture are left"
 
 
+def test_short_rays_follow_the_first_picture_and_end_in_the_right_one() -> None:
+    """They are left aside until a picture stands; what they find is then taken into the samples as an edit is."""
+    wide: dict[str, Any] = dict(light_bound=4.0, samples=64)
+    moved = [View(room(), **{**wide, **more}) for more in (
+        dict(light_compensation=16), dict(light_compensation=16, carry_over=False, samples=256), dict(light_compensation=0))]
+    for view in moved:
+        view.move(THERE)
+    lazy, whole, without = (view.picture().reshape(8, 8, 8, 8, 3).mean((1, 3)) for view in moved)
+    seconds = [view.session.statistics()["values"]["seconds_refine"] for view in moved]
+    assert seconds[0] > 0 and seconds[1] == seconds[2] == 0
+    off, dark = (float(np.abs(picture / whole - 1.0).mean()) for picture in (lazy, without))
+    assert off < 0.025 < 0.06 < dark, (off, dark)
+
+
 def test_an_edit_of_nothing_keeps_everything() -> None:
     view = View(room())
     before = view.counts()

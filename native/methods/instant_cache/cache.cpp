@@ -155,7 +155,8 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
         sums.terms.resize(lights_.padded());
         for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
           Record& record = records_[which[i]];
-          if (settings_.lights.short_rays) record.compensation = nearby_.repair(which[i], nearby, record, counts);
+          if (settings_.lights.short_rays && !lazy_)
+            record.compensation = nearby_.repair(which[i], nearby, record, counts);
           ask(walked, which[i], sums.terms.data(), counts);  // leaves the record's terms
           sum(which[i], sums);
         }

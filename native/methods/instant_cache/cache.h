@@ -32,7 +32,7 @@ struct CacheCounts {
   uint64_t rays_now = 0;  // visibility rays since the last update began
   uint64_t created = 0, updated = 0, reused = 0, moved = 0, dropped = 0, resets = 0, refused = 0;
   uint32_t lights = 0, lights_moved = 0, lights_recoloured = 0, objects_moved = 0;
-  double seconds_lights = 0.0, seconds_update = 0.0, seconds_fill = 0.0;
+  double seconds_lights = 0.0, seconds_update = 0.0, seconds_fill = 0.0, seconds_refine = 0.0;
 };
 
 struct PointGroup;
@@ -61,6 +61,8 @@ class Cache {
  public:
   void configure(const CacheSettings&);
   void update(const CommittedScene&, const SceneChanges&, Work&);
+  /// What a lazy update left: short rays of records that a picture used. Whether their light is visibly another now.
+  bool refine(const CommittedScene&, Work&);
   void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
   Answer answer(const CachePoint&) const;
   /// For many: those without an answer, and those in whose a record that the last fill() made may have a say.
@@ -93,6 +95,9 @@ class Cache {
   void note_use(uint32_t record) const;
   /// Whether the record answered in the last frame or the one before: interrupted frames use few.
   bool was_used(uint32_t record) const { return update_ - used_[record] <= 2; }
+  bool wants_short_rays(uint32_t record) const {
+    return settings_.lights.short_rays && !lazy_ && nearby_.unknown(record);
+  }
   Rgb show_lights(const CachePoint&, float bounced) const;
   void answer(const PointGroup&, std::vector<uint32_t>& near, std::span<Answer>) const;
   bool covered(const CachePoint&) const;
@@ -114,6 +119,7 @@ class Cache {
 
   CacheSettings settings_;
   bool stale_ = true;    // nothing that is kept may be used
+  bool lazy_ = false;    // short rays wait for refine()
   bool loaded_ = false;  // came from a file: the lights have to be compared
   Spacing spacing_;
   LightEmission emission_;

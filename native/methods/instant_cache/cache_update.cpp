@@ -18,6 +18,7 @@ namespace afterglow::instant_cache {
 
 namespace {
 
+constexpr float kVisible = 0.003f;      // relative change of a record's light
 constexpr size_t kManyObjects = 512;    // beyond, everything is asked again
 constexpr size_t kManyObstacles = 128;  // beyond, all short rays are traced again
 constexpr uint32_t kGroup = 16;         // records that are tested together
@@ -73,6 +74,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   LightEmission::surrounding_ball(scene.scene.bounds(), center, radius);
   const float bound = settings_.lights.bound_length(scene.scene.bounds());
   const bool coloured = scene.effects.has(kTransparency) || !shown.empty();
+  lazy_ = work.lazy && settings_.lights.short_rays;
   stale_ |= changes.everything || changes.origin || shown != shown_;
   // Another ball around the scene: all sums are made anew, and the lights whose paths begin on it move. Visibility
   // stays.
@@ -97,9 +99,11 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   const bool compares = std::exchange(loaded_, false) || scaled || other_view;
   if (!all && !compares && seen.empty()) {
     counts_.reused = records_.size();
-    std::vector<uint32_t> waiting;  // an earlier update was interrupted
-    for (uint32_t i = 0; i < records_.size(); ++i)
+    std::vector<uint32_t> waiting;  // an earlier update was interrupted, or lazy
+    for (uint32_t i = 0; i < records_.size(); ++i) {
+      if (wants_short_rays(i)) records_[i].ready = false;
       if (!records_[i].ready && was_used(i)) waiting.push_back(i);
+    }
     if (!settings_.on_demand) counts_.update_rays += resolve(scene, waiting, work);
     has_fresh_ = false;
     return;
@@ -130,7 +134,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
     for (uint32_t w = 0; w < visibility_.words(); ++w)
       any |= unknown[w], counts_.pairs_marked += uint64_t(std::popcount(unknown[w]));
     counts_.pairs += lights_.count;
-    if (any || (settings_.lights.short_rays && nearby_.unknown(i))) {
+    if (any || wants_short_rays(i)) {
       records_[i].ready = false;
       if (was_used(i)) waiting.push_back(i);  // the others wait until somebody wants them
     } else if (recoloured) {
@@ -149,6 +153,22 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   only_moved_.clear();
   has_fresh_ = false;
   counts_.seconds_update += now() - begun;
+}
+
+bool Cache::refine(const CommittedScene& scene, Work& work) {
+  if (!std::exchange(lazy_, false)) return false;
+  const double begun = now();
+  std::vector<uint32_t> waiting;
+  std::vector<Rgb> before;
+  for (uint32_t i = 0; i < records_.size(); ++i)
+    if (was_used(i) && nearby_.unknown(i)) waiting.push_back(i), before.push_back(records_[i].irradiance);
+  counts_.update_rays += resolve(scene, waiting, work);
+  counts_.seconds_refine += now() - begun;
+  for (size_t i = 0; i < waiting.size(); ++i) {
+    const Rgb& now = records_[waiting[i]].irradiance;
+    if (luminance(glm::abs(now - before[i])) > kVisible * luminance(now)) return true;
+  }
+  return false;
 }
 
 /// Cases 1 and 2: slots whose light is not where it was, or shines where it was black.

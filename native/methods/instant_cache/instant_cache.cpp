@@ -50,7 +50,7 @@ class InstantCache final : public IndirectMethod {
     if (verify_) verification_ = cache_.verify(scene, work);
   }
 
-  bool refine(const CommittedScene&, Work&) override { return false; }
+  bool refine(const CommittedScene& scene, Work& work) override { return cache_.refine(scene, work); }
 
   void prepare(const CommittedScene& scene, std::span<const CachePoint> points, Work& work) override {
     cache_.fill(scene, points, work);
@@ -90,6 +90,7 @@ class InstantCache final : public IndirectMethod {
     add("seconds_lights", c.seconds_lights);
     add("seconds_update", c.seconds_update);
     add("seconds_fill", c.seconds_fill);
+    add("seconds_refine", c.seconds_refine);
     if (verify_) {
       add("verified_records", double(verification_.records));
       add("verified_differing", double(verification_.differing));
