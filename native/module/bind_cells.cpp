@@ -4,6 +4,7 @@
 #include <shared_mutex>
 
 #include "methods/hash_cache/cuckoo.h"
+#include "methods/hash_cache/healing.h"
 #include "methods/hash_cache/measure.h"
 #include "methods/hash_cache/occupied.h"
 #include "module/queries.h"
@@ -158,6 +159,7 @@ void bind_cells(py::module_& m) {
         py::arg("light") = py::array_t<double>(std::vector<py::ssize_t>{0, 3}));
   m.def("cuckoo_map", &cuckoo_map, py::arg("keys"), py::arg("usage"), py::arg("asked"));
   m.def("measure_lookups", &measure_lookups, py::arg("cells"), py::arg("lookups"));
+  m.def("samples_worth", &hash_cache::samples_worth, py::arg("samples"), py::arg("doubt"));
   m.def("cell_keys", &cell_keys, py::arg("cells"));
   m.def("updated_cell", &updated_cell, py::arg("light"), py::arg("count"), py::arg("sums"), py::arg("samples") = 1);
   m.def("both_sides", &both_sides, py::arg("normals"), py::arg("sums"), py::arg("samples"), py::arg("frames"),

@@ -286,6 +286,7 @@ void bind_session(py::module_& m) {
       .def("read", &read, py::arg("name") = "combined", py::arg("out") = py::none())
       .def("statistics", &statistics);
   m.def("method_descriptions", &descriptions);
+  m.def("caching_share", &caching_share, py::arg("view_moved"), py::arg("step"));
   m.def("record_rays", &record, py::arg("scene"), py::arg("settings") = py::dict(), py::arg("most") = size_t(500'000));
   bind_denoise(m);
 }

@@ -32,6 +32,12 @@ uint32_t coarsest_step(uint64_t pixels, double sample_seconds);
 inline constexpr double kFirstPassSeconds = 0.02;
 inline constexpr uint32_t kCoarsestStep = 32;
 
+/// Share of its paths that a pass sends into a cache which many pixels fill (the square of the caching resolution
+/// factor of Roth et al. 2020, 3.2). While the view moves, coarse pictures come and go: what they cost is mostly such
+/// paths, and whoever walks on will not see what these would have bettered. The pass of all pixels, which a view gets
+/// when it rests, sends them all. Of the view and the pass alone, never of a clock.
+inline float caching_share(bool view_moved, uint32_t step) { return view_moved && step > 1 ? 0.25f : 1.0f; }
+
 /// The pass as requests over a region, in an order that keeps neighbours together.
 std::vector<PixelRequest> pass_requests(const PassPlan&, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1);
 

@@ -228,7 +228,8 @@ void Session::read(Pass pass, std::vector<float>& out, uint32_t& width, uint32_t
 }
 
 bool Session::carried(const RenderSettings& settings, const Film& film) const {
-  return film.carries() && film_made_for_.same_samples(settings) && same_view(film_seen_by_, scene_->scene.camera());
+  return film.carries() && film_made_for_.same_samples(settings) && film_seen_by_ &&
+         same_view(*film_seen_by_, scene_->scene.camera());
 }
 
 void Session::set_stage(const char* stage) {
@@ -280,7 +281,9 @@ void Session::run(RenderSettings settings) {
     if (carries) film->carry_over();
     if (looks) film->keep_sight();
     film_made_for_ = settings;
-    film_seen_by_ = scene_->scene.camera();
+    const Camera& camera = scene_->scene.camera();
+    view_moved_ = settings.viewport && film_seen_by_ && !same_view(*film_seen_by_, camera);
+    film_seen_by_ = camera;
     {
       const std::lock_guard lock(mutex_);
       film_ = film;

@@ -111,9 +111,10 @@ class Session {
   std::atomic<bool> stop_{false}, paused_{false};
   std::atomic<uint64_t> samples_done_{0};
   double sample_seconds_ = 0.0;  // of the thread alone: what a sample took last, which decides how coarse a start is
-  static constexpr uint64_t kSamplesToTime = 512;
-  RenderSettings film_made_for_;  // of the thread alone: what the film's samples are of
-  Camera film_seen_by_;
+  static constexpr uint64_t kSamplesToTime = 128;  // fewer tell of the thread's waits; a coarse pass must tell
+  RenderSettings film_made_for_;                   // of the thread alone: what the film's samples are of
+  std::optional<Camera> film_seen_by_;
+  bool view_moved_ = false;  // of the thread alone: since the last start
 
   mutable std::mutex mutex_;  // all below
   double extra_ = 0.0;        // samples beyond every pixel's own, for each of those

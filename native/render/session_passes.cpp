@@ -117,6 +117,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     const bool rest_waits = carries && settings.viewport && film.rest_waits();
     if ((!plan.count && !rest_waits) || limit_reached(in_passes, settings.time_limit, done - before, plan.count)) break;
     work.pass = index;
+    work.caching = caching_share(view_moved_, plan.step);
     begun = now();
     bool asks = carries && (settings.viewport ? index < 32 && options.coarsest >> index : index < (goes_on ? 2u : 1u));
     std::vector<PixelRequest> requests = carries && !asks ? catch_up_requests(film, settings.samples)

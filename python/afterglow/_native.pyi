@@ -303,6 +303,8 @@ def both_sides(normals: NDArray[np.float64], sums: NDArray[np.float64], samples:
                changed: int = 0) -> dict[str, Any]:
     """A cell of that structure after so many updates, each a sum of samples that come to the side of a normal in a frame, the
     scene having changed in frame `changed`: front, back, counts of both, normal, frame, bytes."""
+def caching_share(view_moved: bool, step: int) -> float:
+    """Share of its paths that a viewport's pass, on a grid of so many pixels, sends into a cache that is filled as it renders."""
 def cuckoo_map(keys: NDArray[np.uint32], usage: float, asked: NDArray[np.uint32]) -> dict[str, Any]:
     """The paper's map over keys that differ, with `usage` slots for each at first: found, the place of each asked key among the
     keys (-1: none); attempts, how often it was built; bytes."""
@@ -312,6 +314,8 @@ def measure_lookups(cells: int, lookups: int) -> dict[str, float]:
     table's memory. table, map, reads; table_bytes, map_bytes."""
 def cell_keys(cells: NDArray[np.int64]) -> NDArray[np.uint64]:
     """The 64 bits by which the HashCache knows cells, rows of x, y, z, owner, level. Never with a lower half of 0."""
+def samples_worth(samples: int, doubt: float) -> int:
+    """How many of its samples a cell's light of before an edit counts for, where edits since have left so much doubt."""
 def updated_cell(light: float, count: int, sums: NDArray[np.float64], samples: int = 1) -> dict[str, Any]:
     """A cell of the HashCache that holds `count` samples of grey light (0: none), after one update a row of sums (N, 3), each
     of so many samples: light, count."""

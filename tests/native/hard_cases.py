@@ -59,7 +59,19 @@ def ball_under_sky(material: Any = None, radiance: float = 1.0) -> Description:
     return scenes.SCENES["world_furnace"](material, radiance)
 
 
+def ball_grid() -> tuple[Description, np.ndarray]:
+    """A hundred by a hundred balls under an even sky, and their matrices."""
+    scene = Description("instances", Camera(look_at((0, -60, 40), (0, 0, 0)), 1.2))
+    scene.materials["m"] = diffuse((0.6, 0.6, 0.6))
+    scene.world = background((1, 1, 1))
+    y, x = np.mgrid[0:100, 0:100] - 49.5
+    places = np.tile(np.eye(4), (10000, 1, 1))
+    places[:, 0, 3], places[:, 1, 3] = x.ravel(), y.ravel()
+    scene.add("Ball", sphere(0.4, 12, 6), "m", transform=places)
+    return scene, places
+
+
 __all__ = [
-    "SIZE", "Built", "Camera", "Description", "Light", "Mean", "agree", "background", "ball_under_sky", "diffuse", "emission",
-    "look_at", "mean", "one_quad", "quad", "render", "scenes", "sphere", "translate",
+    "SIZE", "Built", "Camera", "Description", "Light", "Mean", "agree", "background", "ball_grid", "ball_under_sky", "diffuse",
+    "emission", "look_at", "mean", "one_quad", "quad", "render", "scenes", "sphere", "translate",
 ]

@@ -13,6 +13,7 @@ from hard_cases import (
     Light,
     agree,
     background,
+    ball_grid,
     ball_under_sky,
     diffuse,
     look_at,
@@ -243,14 +244,7 @@ def test_sheets_in_one_plane_do_not_turn_black_or_bright() -> None:
 
 
 def ten_thousand_instances() -> tuple[Built, np.ndarray]:
-    """A hundred by a hundred balls, and their matrices."""
-    scene = Description("instances", Camera(look_at((0, -60, 40), (0, 0, 0)), 1.2))
-    scene.materials["m"] = diffuse((0.6, 0.6, 0.6))
-    scene.world = background((1, 1, 1))
-    y, x = np.mgrid[0:100, 0:100] - 49.5
-    places = np.tile(np.eye(4), (10000, 1, 1))
-    places[:, 0, 3], places[:, 1, 3] = x.ravel(), y.ravel()
-    scene.add("Ball", sphere(0.4, 12, 6), "m", transform=places)
+    scene, places = ball_grid()
     return Built(scene), places
 
 

@@ -273,11 +273,12 @@ def test_memory_has_a_limit() -> None:
     assert abs(live.session.read("diffuse_indirect").mean() / truth - 1) < 0.2
 
 
-def test_two_sheets_lit_from_one_side() -> None:
-    """A tenth of a millimetre apart: what shines on the upper one's top is in no other side's cells."""
+@pytest.mark.parametrize("sheets", [1, 2])
+def test_two_sheets_lit_from_one_side(sheets: int) -> None:
+    """A tenth of a millimetre apart, or one alone: what shines on the upper one's top is in no other side's cells."""
     scene = Description("sheets", Camera(look_at((0, -1.0, 1.2), (0, 0, 0)), math.radians(40)))
     scene.materials.update(paper=diffuse((0.8, 0.8, 0.8)), lamp=emission(20.0))
-    for name, z in (("Lower", 0.0), ("Upper", 1e-4)):
+    for name, z in (("Upper", 1e-4), ("Lower", 0.0))[:sheets]:
         scene.add(name, quad((-2, -2, z), (2, -2, z), (2, 2, z), (-2, 2, z)), "paper")
     scene.add("Ceiling", quad((-2, -2, 1.5), (-2, 2, 1.5), (2, 2, 1.5), (2, -2, 1.5)), "paper")
     scene.lights = [Light("L", "point", translate((0, 0, 0.7)), 200.0)]

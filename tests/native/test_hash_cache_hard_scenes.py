@@ -13,7 +13,7 @@ from afterglow.scenes import SCENES, Camera, Description, Light, Mesh, look_at, 
 from afterglow.scenes.native import Built, graph
 from afterglow.scenes.rooms import background, diffuse, emission, furnace
 from afterglow.scenes.shapes import box, flipped, join, quad, sphere, transformed
-from hard_cases import Mean, agree, mean, render
+from hard_cases import Mean, agree, ball_grid, mean, render
 from test_hash_cache import Live, indirect
 
 PATHS: dict[str, Any] = dict(size=16, diffuse_bounces=4, max_bounces=12, caustics_reflective=False, caustics_refractive=False)
@@ -108,13 +108,7 @@ def one_triangle() -> Description:
 
 
 def ten_thousand_instances() -> Description:
-    scene = Description("instances", Camera(look_at((0, -60, 40), (0, 0, 0)), 1.2))
-    scene.materials["m"] = diffuse((0.6, 0.6, 0.6))
-    scene.world = background((1, 1, 1))
-    y, x = np.mgrid[0:100, 0:100] - 49.5
-    places = np.tile(np.eye(4), (10000, 1, 1))
-    places[:, 0, 3], places[:, 1, 3] = x.ravel(), y.ravel()
-    scene.add("Ball", sphere(0.4, 12, 6), "m", transform=places)
+    scene, _ = ball_grid()
     scene.add("Floor", quad((-50, -50, -0.4), (50, -50, -0.4), (50, 50, -0.4), (-50, 50, -0.4)), "m")
     return scene
 

@@ -180,8 +180,10 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   }
   const WalkScene walk = walk_scene(scene);
   // Cells that are there already get paths more rarely the more they hold; points without one are asked for holes.
-  const float resolution = work.extra ? 0.0f : settings_.resolution;
-  // The first few paths fill cells in which the others end. What is left has no path; its own cell may be empty.
+  const float resolution = work.extra ? 0.0f : settings_.resolution * work.caching;
+  // The first few paths fill cells in which the others end; where few are sent, filling cells thrice costs more. What
+  // is left has no path; its own cell may be empty.
+  const bool at_once = work.caching < 1.0f;
   enum Kind : uint8_t { kFirst, kSecond, kThird, kEmpty, kKinds, kNone = kKinds };
   std::vector<uint8_t> kinds(points.size());
   const size_t blocks = (points.size() + kFillBlock - 1) / kFillBlock;
@@ -203,7 +205,7 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
         const float share = resolution * share_of_paths(known.count, settings_.enough);
         const float u = unit_float(hash(hash_of(points[at + k], seed_), points[at + k].sample, 1));
         Kind kind = known ? kNone : kEmpty;
-        if (u < share) kind = u < 0.03f * share ? kFirst : u < 0.2f * share ? kSecond : kThird;
+        if (u < share) kind = at_once ? kThird : u < 0.03f * share ? kFirst : u < 0.2f * share ? kSecond : kThird;
         kinds[at + k] = kind;
         if (kind != kNone) counts[kind]++;
       }

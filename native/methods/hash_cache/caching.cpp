@@ -17,6 +17,7 @@ namespace {
 constexpr uint32_t kMostStored = 16;
 constexpr float kMostLight = 1e30f;  // what is above is dropped and counted, as in the path tracer
 constexpr size_t kBlock = 128;
+constexpr size_t kFewBlock = 16;   // where a hundred paths are to occupy all threads
 constexpr uint32_t kSettled = 32;  // samples from which on a path may end in a cell
 constexpr float kLongest = 0.5f;   // of the way to a surface: the longest cell that a path may end in there
 
@@ -294,6 +295,22 @@ void trace_again(PathInput in, std::span<const Probe> probes, std::span<Rgb> lig
   }
 }
 
+/// Paths in blocks, each with counts of its own; stopped ones are left out.
+template <class Body>
+void each_block(size_t paths, size_t block, const Work& work, RayCounts& counts, const Body& body) {
+  std::mutex mutex;
+  parallel_blocks(
+      paths, block, work.threads,
+      [&](size_t begin, size_t end) {
+        if (work.stop.stop()) return;
+        RayCounts own;
+        body(begin, end, own);
+        const std::lock_guard lock(mutex);
+        counts += own;
+      },
+      work.stop);
+}
+
 constexpr uint32_t kPlain = kFeatureLobes | kFeatureShapes, kWinding = kPlain | kFeatureStraight;
 
 bool goes_straight(const WalkScene& walk) {
@@ -323,18 +340,10 @@ std::vector<Sample> cache_paths(const WalkScene& walk, const Cells& cells, const
   const PathInput in = input_of(walk, cells, settings, seed);
   std::vector<std::vector<Sample>> blocks((chosen.size() + kBlock - 1) / kBlock);
   std::vector<std::vector<Probe>> probes(blocks.size());
-  std::mutex mutex;
-  parallel_blocks(
-      chosen.size(), kBlock, work.threads,
-      [&](size_t begin, size_t end) {
-        if (work.stop.stop()) return;
-        RayCounts own;
-        (goes_straight(walk) ? trace<kWinding> : trace<kPlain>)(in, points, chosen.subspan(begin, end - begin),
-                                                                blocks[begin / kBlock], probes[begin / kBlock], own);
-        const std::lock_guard lock(mutex);
-        counts += own;
-      },
-      work.stop);
+  const auto traces = goes_straight(walk) ? trace<kWinding> : trace<kPlain>;
+  each_block(chosen.size(), kBlock, work, counts, [&](size_t begin, size_t end, RayCounts& own) {
+    traces(in, points, chosen.subspan(begin, end - begin), blocks[begin / kBlock], probes[begin / kBlock], own);
+  });
   std::vector<Sample> samples;
   if (work.stop.stop()) return samples;
   std::vector<size_t> first(1, 0);
@@ -353,19 +362,10 @@ std::vector<Rgb> walk_again(const WalkScene& walk, const Cells& cells, const Cac
   PathInput in = input_of(walk, cells, settings, 0);
   in.whole = true;
   std::vector<Rgb> light(probes.size(), Rgb(std::numeric_limits<float>::quiet_NaN()));
-  std::mutex mutex;
-  parallel_blocks(
-      probes.size(), kBlock, work.threads,
-      [&](size_t begin, size_t end) {
-        if (work.stop.stop()) return;
-        RayCounts own;
-        (goes_straight(walk) ? trace_again<kWinding>
-                             : trace_again<kPlain>)(in, probes.subspan(begin, end - begin),
-                                                    std::span(light).subspan(begin, end - begin), own);
-        const std::lock_guard lock(mutex);
-        counts += own;
-      },
-      work.stop);
+  const auto traces = goes_straight(walk) ? trace_again<kWinding> : trace_again<kPlain>;
+  each_block(probes.size(), kFewBlock, work, counts, [&](size_t begin, size_t end, RayCounts& own) {
+    traces(in, probes.subspan(begin, end - begin), std::span(light).subspan(begin, end - begin), own);
+  });
   if (work.stop.stop()) light.clear();
   return light;
 }
