@@ -46,6 +46,7 @@ struct MethodTraits {
                              // discontinuity buffer
   bool fills_holes = false;  // prepare() wants only the points that gather() could not answer
   float extra = 0.0f;        // camera samples beyond every pixel's own, where noise is: as many a pixel on average
+  uint32_t first = 0;        // samples that a final picture takes at least, because nothing is remembered yet
   bool exact = false;        // samples are independent and without bias: what they spread by is the picture's error
 };
 

@@ -2,6 +2,7 @@
 // Methods that serve every light term take requests as they are; for the others the camera's paths are walked here.
 #include "render/renderer.h"
 
+#include <chrono>
 #include <cstdio>
 #include <fstream>
 
@@ -47,7 +48,10 @@ void Renderer::render(const CommittedScene& scene, std::span<const PixelRequest>
 
 void Renderer::look(const CommittedScene& scene, Film& film, uint32_t samples, Work& work) {
   const std::vector<PixelRequest> requests = sight_requests(film, sight_wanted(samples));
+  const auto begun = std::chrono::steady_clock::now();
   afterglow::look(scene, requests, film, work, settings_, times_.counts);
+  times_.look += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  for (const PixelRequest& r : requests) times_.looks += r.count;
   film.set_looked(samples);
 }
 
@@ -81,6 +85,7 @@ MethodStatistics Renderer::statistics() const {
   add("bounce_rays", double(times_.counts.bounce));
   add("shadow_rays", double(times_.counts.shadow));
   add("dropped", double(times_.counts.dropped + times_.dropped));
+  add("looks", double(times_.looks));
   add("questions", double(times_.points));
   add("holes", double(times_.holes));
   add("seconds_walk", times_.walk);
@@ -88,6 +93,7 @@ MethodStatistics Renderer::statistics() const {
   add("seconds_prepare", times_.prepare);
   add("seconds_filter", times_.filter);
   add("seconds_film", times_.film);
+  add("seconds_look", times_.look);
   return s;
 }
 

@@ -29,6 +29,8 @@ class Renderer {
   float extra() const { return method_->traits().extra; }
   /// Whether light that the method answers for is without noise, and stands in a pass of its own.
   bool carries() const { return method_->traits().steady; }
+  /// Samples that a final picture takes at least; known after update().
+  uint32_t first() const { return method_->traits().first; }
   /// Whether edges of what shines may get rays of their own.
   bool looks() const { return method_->traits().terms != kAllTerms; }
   bool running() const { return method_->traits().running; }

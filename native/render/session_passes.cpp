@@ -18,7 +18,7 @@ double now() { return std::chrono::duration<double>(std::chrono::steady_clock::n
 
 /// Prefiltered guides take a tenth to an eighth off the denoised error (Country Kitchen, 4 and 16 samples), as half as
 /// many samples again would, for what one or two samples cost.
-constexpr uint32_t kPrefilterFrom = 4;
+constexpr double kPrefilterFrom = 4.0;
 /// Pictures of a cache are smooth but for direct light: their first one may take three times as long and be finer.
 constexpr double kFinerStart = 1.0 / 3.0;
 
@@ -92,8 +92,10 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
   double begun = now();
   work.lazy = settings.viewport && film.carries();
   renderer.update(*scene_, work);
+  const uint32_t wanted = settings.viewport ? settings.samples : std::max(settings.samples, renderer.first());
   {
     const std::lock_guard lock(mutex_);
+    shown_settings_.samples = wanted;
     statistics_.seconds["prepare"] = now() - begun;
     extra_ = renderer.extra();
     stage_ = "rendering";
@@ -101,7 +103,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
   if (renderer.extra() > 0.0f) film.keep_noise();
   const FilmSettings& f = film.settings();
   const uint64_t pixels = uint64_t(film.width()) * film.height();
-  const ScheduleOptions options{before + settings.samples, settings.viewport, settings.time_limit > 0.0f,
+  const ScheduleOptions options{before + wanted, settings.viewport, settings.time_limit > 0.0f,
                                 coarsest_step(pixels, sample_seconds_ * (renderer.exact() ? 1.0 : kFinerStart))};
   bool shown_filtered = false;
   const bool carries = film.carries();
@@ -120,7 +122,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     work.caching = caching_share(view_moved_, plan.step);
     begun = now();
     bool asks = carries && (settings.viewport ? index < 32 && options.coarsest >> index : index < (goes_on ? 2u : 1u));
-    std::vector<PixelRequest> requests = carries && !asks ? catch_up_requests(film, settings.samples)
+    std::vector<PixelRequest> requests = carries && !asks ? catch_up_requests(film, wanted)
                                          : asks ? pass_requests({0, 1, plan.step, plan.skip}, f.x0, f.y0, f.x1, f.y1)
                                                 : pass_requests(plan, f.x0, f.y0, f.x1, f.y1);
     if (carries) {
@@ -151,7 +153,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     for (const PixelRequest& request : requests) samples += sample_count(request);
     if (samples >= kSamplesToTime && !paused_) sample_seconds_ = (seconds - looking) / double(samples);
     BelievedError noise;
-    const bool due = error_is_due(done) || (done >= 2 && done >= settings.samples);
+    const bool due = error_is_due(done) || (done >= 2 && done >= wanted);
     if (plan.step == 1 && due) noise = carries ? spread_of(film) : film.believed_error();
     const MethodStatistics told = renderer.statistics();
     for (const std::string& warning : told.warnings) warn(warning);
@@ -210,10 +212,10 @@ void Session::publish(const RenderSettings& settings, const Film& film, uint32_t
 bool Session::filter(const RenderSettings& settings, const Film& film, Image& image) {
   set_stage("denoising");
   const double begun = now();
-  uint32_t samples;
+  double samples;
   {
     const std::lock_guard lock(mutex_);
-    samples = statistics_.samples;
+    samples = statistics_.samples * (1.0 + extra_);
   }
   const size_t pixels = size_t(image.width) * image.height;
   const auto images = std::make_shared<DenoiseImages>();

@@ -41,8 +41,8 @@ using WalkKernel = void (*)(const path_tracing::KernelInput&, const PixelRequest
 WalkKernel choose_walk_kernel(const Effects&, PassSet passes, bool local_view);
 
 struct WavefrontTimes {
-  double walk = 0.0, gather = 0.0, prepare = 0.0, filter = 0.0, film = 0.0;
-  uint64_t points = 0, holes = 0, dropped = 0;
+  double walk = 0.0, gather = 0.0, prepare = 0.0, filter = 0.0, film = 0.0, look = 0.0;
+  uint64_t looks = 0, points = 0, holes = 0, dropped = 0;
   RayCounts counts;
 };
 

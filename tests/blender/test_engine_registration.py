@@ -116,7 +116,7 @@ def test_a_click_prepares_an_animation(in_blender: Run) -> None:
         result(objects=[own.method, own.accuracy, own.instant_cache.virtual_lights, own.instant_cache.light_compensation])
         """
     )
-    assert found["camera"] == ["HASH_CACHE", 2, 2.5, True, 7]
+    assert found["camera"] == ["HASH_CACHE", 1, 3.0, True, 7]
     assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 32]
 
 

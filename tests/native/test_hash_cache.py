@@ -166,6 +166,21 @@ def test_all_from_the_cache_has_the_same_light(variant: str) -> None:
         assert results[0].statistics["rays"]["shadow"] == 0
 
 
+def test_the_first_picture_of_an_empty_cache_takes_its_samples() -> None:
+    """And no other, whatever is edited; a viewport takes what it is asked for."""
+    live = Live(cornell_box(), samples=1, hash_first=5, hash_extra=0.0, passes=["sample_count", "diffuse_indirect"])
+    counts = [int(live.session.read("sample_count").max())]
+    live.look_from((0.1, -3.9, 1), (0, 0, 1))
+    counts.append(int(live.session.read("sample_count").max()))
+    live.session.forget_cache()
+    live.run(seed=9)
+    counts.append(int(live.session.read("sample_count").max()))
+    live.run(seed=10, hash_first=0)
+    counts.append(int(live.session.read("sample_count").max()))
+    assert counts == [5, 1, 5, 1]
+    assert Live(cornell_box(), samples=1, hash_first=5, viewport=True).session.statistics()["samples"] == 1
+
+
 def test_the_picture_of_a_still_view_goes_on() -> None:
     still = Live(cornell_box(), hash_running=True)
 

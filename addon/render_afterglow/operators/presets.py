@@ -16,7 +16,8 @@ QUALITIES = {
     ),
     # Animations whose caches live from frame to frame: as the bench's figures `frames` have them.
     "CAMERA": dict(
-        method="HASH_CACHE", accuracy=0.0, samples=2, denoise=True, use_animated_seed=True, hash_cache=dict(hash_extra=2.5)
+        method="HASH_CACHE", accuracy=0.0, samples=1, denoise=True, use_animated_seed=True,
+        hash_cache=dict(hash_extra=3.0, hash_resolution=0.5, hash_first=4),
     ),
     "OBJECTS": dict(
         method="INSTANT_CACHE", accuracy=0.0, samples=6, denoise=True, use_animated_seed=True,

@@ -25,7 +25,8 @@ View view_of(const SettingValue& value) {
 class HashCache final : public IndirectMethod {
  public:
   MethodTraits traits() const override {
-    return {.layers = filter_, .running = running_, .lights = direct_ ? 0u : lights_, .extra = extra_};
+    return {.layers = filter_, .running = running_, .lights = direct_ ? 0u : lights_, .extra = extra_,
+            .first = cold_ ? first_ : 0u};
   }
 
   void configure(const Settings& settings) override {
@@ -34,6 +35,7 @@ class HashCache final : public IndirectMethod {
     running_ = true;
     lights_ = kLights;
     extra_ = kExtra;
+    first_ = 0;
     s.keep = kKeep;
     direct_ = false;
     s.caching.walk.configure(settings);
@@ -55,6 +57,7 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_lights") lights_ = uint32_t(integer_of(value));
       if (name == "hash_direct") s.caching.direct = direct_ = integer_of(value) != 0;
       if (name == "hash_extra") extra_ = float(number_of(value));
+      if (name == "hash_first") first_ = uint32_t(integer_of(value));
       if (name == "hash_long_paths") s.caching.long_paths = float(number_of(value));
       if (name == "hash_view") s.view = view_of(value);
     }
@@ -63,6 +66,7 @@ class HashCache final : public IndirectMethod {
   }
 
   void update(const CommittedScene& scene, const SceneChanges& changes, Work& work) override {
+    cold_ = cache_.table().size() == 0;
     cache_.update(scene, changes, work);
   }
   bool refine(const CommittedScene&, Work&) override { return false; }
@@ -109,8 +113,8 @@ class HashCache final : public IndirectMethod {
 
  private:
   Cache cache_;
-  bool filter_ = true, running_ = true, direct_ = false;
-  uint32_t lights_ = kLights;
+  bool filter_ = true, running_ = true, direct_ = false, cold_ = true;
+  uint32_t lights_ = kLights, first_ = 0;
   float extra_ = kExtra;
 };
 
@@ -141,6 +145,9 @@ MethodDescription describe() {
       "Samples beyond every pixel's own, for each of those one on average, that go where the picture is noisy: edges, "
       "gloss",
       "", double(kExtra), 0.0, 16.0);
+  add("hash_first", "First Samples",
+      "Samples that the first picture of an empty cache takes at least: what it leaves, all that follow begin with", "",
+      int64_t(0), 0.0, 65536.0);
   add("hash_resolution", "Caching Resolution",
       "Paths that fill the cache, as a share of the image's width and height; what no cell answers is filled anyway",
       "", 1.0, 0.0, 1.0);
