@@ -122,6 +122,12 @@ Rgb Film::seen(const float* sums) const {
   return Rgb(emission[0] + share * sky[0], emission[1] + share * sky[1], emission[2] + share * sky[2]);
 }
 
+/// Luminance of all rays' mean.
+float Film::mean_seen(const Sight& sight, const float* sums, uint32_t samples) const {
+  const Rgb more = sight.emission + (settings_.transparent ? Rgb(0.0f) : sight.environment);
+  return luminance(seen(sums) + more) / float(samples + sight.samples);
+}
+
 /// Puts the mean over all rays in the place of the samples' own.
 void Film::add_sight(Pass pass, const Sight& sight, const float* sums, uint32_t samples, float* out) const {
   if (!sight.samples || !samples) return;
@@ -413,17 +419,20 @@ void Film::read_row(Pass pass, float* out, uint32_t y, uint32_t step) const {
       continue;
     }
     const size_t pixel = y * w + x;
-    uint32_t samples;
+    uint32_t samples, all;
     Sight sight;
     {
       const Lock lock(*this, pixel);
       if (keeps_sight()) sight = sight_[pixel];
       std::memcpy(sums.data(), sums_.data() + pixel * size_t(layout_.floats), size_t(layout_.floats) * sizeof(float));
-      samples = pass == Pass::kBatches ? in_batches(pixel) : counts_[pixel];
+      all = counts_[pixel], samples = pass == Pass::kBatches ? in_batches(pixel) : all;
     }
     if (!samples) sums.fill(0.0f);
     read_pixel(pass, sums.data(), samples, to);
     add_sight(pass, sight, sums.data(), samples, to);
+    if (pass == Pass::kBatches && keeps_sight() && all)
+      for (uint32_t b = 0; b < batches_begun(samples); ++b)
+        to[b] += mean_seen(sight, sums.data(), all) * settings_.exposure;
     if (!carry_ || pass != Pass::kCombined || !samples) continue;
     const Rgb& smooth = carry_->smoothing(pixel);
     for (int c = 0; c < 3; ++c) to[c] = std::max(0.0f, to[c] + smooth[c] * settings_.exposure);
@@ -435,6 +444,10 @@ uint32_t Film::batch_sums(size_t pixel, float* sums) const {
   std::memcpy(sums, sums_.data() + pixel * size_t(layout_.floats) + size_t(layout_[Pass::kBatches]),
               kBatchCount * sizeof(float));
   const uint32_t samples = in_batches(pixel);
+  if (keeps_sight() && counts_[pixel]) {  // batches hold what is noisy alone
+    const float seen = mean_seen(sight_[pixel], sums_.data() + pixel * size_t(layout_.floats), counts_[pixel]);
+    for (uint32_t b = 0; b < kBatchCount; ++b) sums[b] += seen * float(batch_samples(samples, b));
+  }
   if (samples == counts_[pixel] || !samples) return samples;
   // Extra samples make the mean surer: batches are shown as far apart as if all had stood in them.
   double mean = 0.0;

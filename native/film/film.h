@@ -135,6 +135,7 @@ class Film {
     uint32_t samples = 0;
   };
   Rgb seen(const float* sums) const;
+  float mean_seen(const Sight&, const float* sums, uint32_t samples) const;
   void add_sight(Pass, const Sight&, const float* sums, uint32_t samples, float* out) const;
   void read_row(Pass, float* out, uint32_t y, uint32_t step) const;
   void read_pixel(Pass, const float* sums, uint32_t samples, float* out) const;

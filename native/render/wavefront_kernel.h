@@ -25,7 +25,7 @@ class AskingVisitor : public path_tracing::FilmVisitor<kPasses> {
 
   void end_path() {
     if (out_.noise)
-      out_.luminances.push_back(luminance(this->light_ - (this->in_.film.keeps_sight() ? this->seen_ : Rgb(0.0f))));
+      out_.luminances.push_back(luminance(this->noisy()));
     this->end_sample();
   }
 

@@ -69,6 +69,17 @@ def test_passes_still_add_up_to_the_picture() -> None:
     assert np.allclose(total, result.passes["combined"][..., :3], rtol=1e-4, atol=1e-4)
 
 
+def test_batches_keep_the_picture_s_mean_and_tell_less_noise() -> None:
+    told = {}
+    for sight in (False, True):
+        result = render(bars(), samples=64, passes=["combined", "batches"], **{**SETTINGS, "sight": sight})
+        mean = result.image[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
+        batches = result.passes["batches"]
+        assert np.allclose(batches.mean(axis=-1), mean, rtol=2e-3, atol=2e-3)
+        told[sight] = batches.std(axis=-1).sum()
+    assert told[True] < 0.5 * told[False]
+
+
 def test_a_transparent_film_shows_no_sky() -> None:
     scene = veiled()
     scene.objects = [o for o in scene.objects if o.name != "Window"]

@@ -35,7 +35,7 @@ class FilmVisitor {
     float* combined = sums_ + layout_[Pass::kCombined];
     for (int c = 0; c < 3; ++c) combined[c] += light_[c];
     combined[3] += transparent_;
-    *batch_ += luminance(light_);
+    *batch_ += luminance(noisy());
   }
 
   /// Depth, position and indexes are those in the middle of the pixel, as in Cycles: a walk before the first sample, of
@@ -132,6 +132,14 @@ class FilmVisitor {
   }
 
  protected:
+  /// Light of which the samples tell the noise: rays of their own may see to the rest.
+  Rgb noisy() const {
+    if constexpr (kPasses) {
+      if (in_.film.keeps_sight()) return light_ - seen_;
+    }
+    return light_;
+  }
+
   /// Clamped, within bounds and not negative; what is dropped is counted.
   Rgb kept(const Rgb& light, bool direct) {
     const float sum = std::fabs(light.x) + std::fabs(light.y) + std::fabs(light.z);
