@@ -135,8 +135,8 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     if (stop_) break;
     if (asks) film.end_asking(plan.step, settings.viewport);
     if (plan.step == 1) done = carries ? least_samples(film) : plan.first + plan.count;
-    const bool looks = film.keeps_sight() && plan.step == 1 && !film.asks() && done >= std::max(1u, 2 * film.looked()) &&
-                       (!settings.viewport || done >= kLooksFrom);
+    const bool looks = film.keeps_sight() && plan.step == 1 && !film.asks() &&
+                       done >= std::max(1u, 2 * film.looked()) && (!settings.viewport || done >= kLooksFrom);
     double looking = now();
     if (looks) renderer.look(*scene_, film, done, work);
     looking = now() - looking;
@@ -180,7 +180,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
         at_last_publish = now();
       }
     }
-    if (std::exchange(work.lazy, work.lazy && plan.step > 1) && !work.lazy && renderer.refine(*scene_, work)) {
+    if (std::exchange(work.lazy, false) && renderer.refine(*scene_, work)) {
       if (stop_) break;
       film.begin_asking();  // as after an edit
       caught_up = 0, index = uint32_t(-1);

@@ -101,6 +101,27 @@ def test_short_rays_follow_the_first_picture_and_end_in_the_right_one() -> None:
     assert off < 0.025 < 0.06 < dark, (off, dark)
 
 
+def test_short_rays_that_waited_are_those_of_a_fresh_cache() -> None:
+    """Edits that came before them are all remembered: another render on the same scene finds every record right."""
+    more: dict[str, Any] = dict(light_compensation=8, light_bound=4.0)
+    view = View(room(), **more)
+    for i in range(24):
+        share = i % 12 / 11
+        view.move(tuple((1 - share) * a + share * b for a, b in zip(HERE, THERE, strict=True)), wait=i % 5 == 0)
+        time.sleep(0.003 * (i % 4))
+        if i % 7 == 3:
+            with view.session.edit():
+                view.built.scene.set_light(next(iter(view.built.lights.values())), power=20.0 + i)
+                view.built.scene.commit()
+    view.session.wait()
+    view.session.cancel()
+    other = afterglow.Session(view.built.scene, {**SETTINGS, **more, "viewport": False, "samples": 1, "cache_verify": True})
+    other.start()
+    other.wait()
+    values = other.statistics()["values"]
+    assert values["resets"] == 1 and values["verified_records"] > 100 and values["verified_worst"] <= 1e-5
+
+
 def test_an_edit_of_nothing_keeps_everything() -> None:
     view = View(room())
     before = view.counts()

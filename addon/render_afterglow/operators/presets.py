@@ -114,6 +114,7 @@ class AFTERGLOW_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):
             "denoise",
             "preview_accuracy",
             "preview_samples",
+            "preview_short_rays",
             "use_preview_denoising",
         )
     ]

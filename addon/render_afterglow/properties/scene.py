@@ -132,6 +132,15 @@ class AfterglowSceneSettings(bpy.types.PropertyGroup):
         precision=4,
         step=0.1,
     )
+    preview_short_rays: IntProperty(
+        name="Short Rays",
+        description="Rays of each record of the instant cache that gather light of near surfaces, once a first picture stands: "
+        "corners are not too dark and walls are even. The bounding distance is then 4 at least; 0: none",
+        default=32,
+        min=0,
+        max=1024,
+        soft_max=64,
+    )
     use_preview_denoising: BoolProperty(
         name="Denoise", description="Denoise the viewport while it refines", default=False
     )
@@ -168,6 +177,7 @@ LIGHT_PATHS = (
     "caustics_reflective",
     "caustics_refractive",
 )
+PREVIEW_BOUND = 4.0  # with short rays, which bring what it takes
 _SESSION_NAMES = (*LIGHT_PATHS, "film_exposure", "filter_width")
 
 
@@ -198,6 +208,9 @@ def session_settings(scene: bpy.types.Scene, viewport: bool) -> dict[str, Any]:
             group = getattr(own, name)
             keys = [key for key in group.__annotations__ if viewport or not methods.is_debug(key)]
             settings.update({key: getattr(group, key) for key in keys})  # final renders show light, always
+    if viewport and own.carry_over and own.preview_short_rays and own.method in {"AUTO", "INSTANT_CACHE"}:
+        settings["light_compensation"] = max(settings.get("light_compensation", 0), own.preview_short_rays)
+        settings["light_bound"] = max(settings.get("light_bound", 0.0), PREVIEW_BOUND)
     return settings
 
 

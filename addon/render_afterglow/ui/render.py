@@ -120,6 +120,10 @@ class AFTERGLOW_RENDER_PT_sampling_viewport(PropertiesPanel, bpy.types.Panel):
         layout.prop(settings, "preview_samples", text="Max Samples" if settings.preview_accuracy > 0 else "Samples")
         layout.prop(context.scene.render, "preview_pixel_size", text="Pixel Size")
         layout.prop(settings, "carry_over")
+        if settings.method in {"AUTO", "INSTANT_CACHE"}:
+            row = layout.row()
+            row.active = settings.carry_over
+            row.prop(settings, "preview_short_rays")
 
 
 class AFTERGLOW_RENDER_PT_denoise(PropertiesPanel, bpy.types.Panel):

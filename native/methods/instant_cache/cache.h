@@ -86,7 +86,9 @@ class Cache {
   void prepare_moved_rays(const CommittedScene&, const std::vector<Moved>&);
   void mark_hidden(size_t record);
   void mark(size_t record, const std::vector<uint64_t>& slots);
-  void mark_nearby(const CommittedScene&, const SceneChanges&, const std::vector<Moved>&, Work&);
+  /// What short rays met is marked at once, or by refine().
+  void note_nearby(const CommittedScene&, const SceneChanges&, const std::vector<Moved>&, Work&);
+  void mark_nearby(const CommittedScene&, Work&);
   /// Whether the last frame was interrupted, told from how many records it asked.
   void look_back();
   void age();
@@ -136,6 +138,7 @@ class Cache {
 
   std::vector<Record> records_;
   VisibilityTable visibility_;
+  std::vector<NearbyEdit> nearby_edits_;
   NearbyTable nearby_;                     // without short rays it has no rows
   std::vector<uint64_t> only_moved_;       // bits of records: was seen, and only what just moved can hide it
   std::unique_ptr<RaySubset> moved_rays_;  // through what just moved; both for the last update alone

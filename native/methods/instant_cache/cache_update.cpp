@@ -20,6 +20,7 @@ namespace {
 
 constexpr float kVisible = 0.003f;      // relative change of a record's light
 constexpr size_t kManyObjects = 512;    // beyond, everything is asked again
+constexpr size_t kManyEdits = 16;       // that wait for their marks
 constexpr size_t kManyObstacles = 128;  // beyond, all short rays are traced again
 constexpr uint32_t kGroup = 16;         // records that are tested together
 
@@ -58,7 +59,7 @@ void Cache::reset(const CommittedScene& scene) {
   visibility_.reset(
       plan_slots(settings_.lights.count, settings_.lights.options(settings_.walk.limits, 0).bounces).slots,
       scene.effects.has(kTransparency) || !shown_.empty());
-  nearby_.reset(settings_.lights.short_rays);
+  nearby_.reset(settings_.lights.short_rays), nearby_edits_.clear();
   octree_.clear(center_, radius_);
   lights_.fill({});
   placement_.clear();
@@ -97,6 +98,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   const Viewpoint viewpoint = snapped_viewpoint(scene);
   const bool other_view = std::exchange(viewpoint_, viewpoint) != viewpoint && emission_.far();
   const bool compares = std::exchange(loaded_, false) || scaled || other_view;
+  if (!lazy_) mark_nearby(scene, work);
   if (!all && !compares && seen.empty()) {
     counts_.reused = records_.size();
     std::vector<uint32_t> waiting;  // an earlier update was interrupted, or lazy
@@ -124,7 +126,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   if (settings_.lights.short_rays) {
     if (other_bound)
       for (size_t i = 0; i < records_.size(); ++i) nearby_.forget(i);
-    mark_nearby(scene, changes, moved, work);
+    note_nearby(scene, changes, moved, work);
   }
 
   std::vector<uint32_t> waiting, dimmed;
@@ -158,6 +160,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
 bool Cache::refine(const CommittedScene& scene, Work& work) {
   if (!std::exchange(lazy_, false)) return false;
   const double begun = now();
+  mark_nearby(scene, work);
   std::vector<uint32_t> waiting;
   std::vector<Rgb> before;
   for (uint32_t i = 0; i < records_.size(); ++i)
@@ -332,26 +335,36 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
 }
 
 /// What short rays met rides along with nothing: their walks go anew where an object's bounds touch them.
-void Cache::mark_nearby(const CommittedScene& scene, const SceneChanges& changes, const std::vector<Moved>& moved,
+void Cache::note_nearby(const CommittedScene& scene, const SceneChanges& changes, const std::vector<Moved>& moved,
                         Work& work) {
-  std::vector<Obstacle> obstacles;
+  NearbyEdit edit;
   for (const Moved& m : moved) {
-    if (m.before.present()) obstacles.emplace_back(m.before, m.in_place, true, m.opaque);
-    if (m.after.present() && !m.in_place) obstacles.emplace_back(m.after, true, false, false);
+    if (m.before.present()) edit.obstacles.emplace_back(m.before, m.in_place, true, m.opaque);
+    if (m.after.present() && !m.in_place) edit.obstacles.emplace_back(m.after, true, false, false);
   }
-  for (const Bounds& bounds : placement_.repainted(scene, changes)) obstacles.emplace_back(bounds, true, true, false);
-  const bool many = obstacles.size() > kManyObstacles;
+  for (const Bounds& bounds : placement_.repainted(scene, changes))
+    edit.obstacles.emplace_back(bounds, true, true, false);
   light_changes_.lamps = std::exchange(lamps_version_, scene.lights.version()) != scene.lights.version();
-  if (!many && obstacles.empty() && !light_changes_.any && !light_changes_.lamps) return;
+  edit.lights = light_changes_;
+  if (!edit.obstacles.empty() || edit.lights.any || edit.lights.lamps) nearby_edits_.push_back(std::move(edit));
+  if (!lazy_ || nearby_edits_.size() >= kManyEdits) mark_nearby(scene, work);
+}
+
+/// Edits one after the other. Lights stand where the last one put them: what an earlier one asks of a light that moved
+/// since is marked by the later one.
+void Cache::mark_nearby(const CommittedScene& scene, Work& work) {
+  if (nearby_edits_.empty()) return;
   const WalkScene walked = walk(scene);
   const ShortRays rays = short_rays(walked);
   parallel_blocks(records_.size(), kGroup, work.threads, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      if (many)
-        nearby_.forget(i);
-      else
-        nearby_.mark(i, records_[i], rays, obstacles, light_changes_, lights_);
+    for (const NearbyEdit& edit : nearby_edits_)
+      for (size_t i = begin; i < end; ++i)
+        if (edit.obstacles.size() > kManyObstacles)
+          nearby_.forget(i);
+        else
+          nearby_.mark(i, records_[i], rays, edit.obstacles, edit.lights, lights_);
   });
+  nearby_edits_.clear();
 }
 
 void Cache::look_back() {

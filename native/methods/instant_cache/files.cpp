@@ -234,7 +234,7 @@ void Cache::load(const CommittedScene& scene, std::span<const char> bytes) {
   visibility_.read(h.records, at);
   lights_.fill(std::move(lights));
   records_ = std::move(records), used_ = std::move(used), wanted_ = std::move(wanted);
-  nearby_.reset(settings_.lights.short_rays);
+  nearby_.reset(settings_.lights.short_rays), nearby_edits_.clear();
   if (settings_.lights.short_rays)
     for (size_t i = 0; i < records_.size(); ++i) nearby_.add_row();
   rebuild_octree();

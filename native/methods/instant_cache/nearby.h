@@ -44,6 +44,12 @@ class Obstacle {
   bool came_, left_, opaque_;
 };
 
+/// An edit whose marks are still to be made.
+struct NearbyEdit {
+  std::vector<Obstacle> obstacles;
+  LightChanges lights;
+};
+
 class NearbyTable {
  public:
   void reset(uint32_t rays);

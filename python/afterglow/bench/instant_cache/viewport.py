@@ -15,6 +15,7 @@ from ..foundation.kitchen import PERCENT, scene
 from ..foundation.viewport import Watched, first_image, watch
 
 CACHED = ("method=INSTANT_CACHE",)
+AS_VIEWPORT = {"light_compensation": 32, "light_bound": 4.0}  # what the add-on's viewports add to the method's settings
 SETTLED = 24  # samples a pixel: about as many as the window has when it is looked at last
 RESTS = 0.005  # mean difference of display values to the settled image
 
@@ -33,7 +34,8 @@ def settled_error() -> float:
     file, reference = scene()
     with blenders.Worker.of_debian() as worker:
         worker.open(file, PERCENT)
-        answer = worker.render("AFTERGLOW", method="INSTANT_CACHE", samples=SETTLED, accuracy=0.0, seed=0, persistent=True)
+        answer = worker.render("AFTERGLOW", method="INSTANT_CACHE", samples=SETTLED, accuracy=0.0, seed=0, persistent=True,
+                               **AS_VIEWPORT)
         return metrics.relmse(images.read(answer["image"]), images.read(reference))
 
 
