@@ -3,6 +3,7 @@
 #include <bit>
 #include <chrono>
 #include <shared_mutex>
+#include <thread>
 #include <utility>
 
 #include "base/errors.h"
@@ -24,6 +25,8 @@ constexpr double kFinerStart = 1.0 / 3.0;
 
 /// A viewport's first picture does not wait for rays that only look.
 constexpr uint32_t kLooksFrom = 2;
+/// In which a first picture reaches the screen before all cores are busy with what comes after it.
+constexpr std::chrono::milliseconds kDrawn(70);
 /// Passes for the pixels that an edit left without samples, before those are asked that seem untouched.
 constexpr uint32_t kCaughtUp = 6;
 
@@ -180,7 +183,9 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
         at_last_publish = now();
       }
     }
-    if (std::exchange(work.lazy, false) && renderer.refine(*scene_, work)) {
+    const bool refines = std::exchange(work.lazy, false);
+    if (refines) std::this_thread::sleep_for(kDrawn);
+    if (refines && !stop_ && renderer.refine(*scene_, work)) {
       if (stop_) break;
       film.begin_asking();  // as after an edit
       caught_up = 0, index = uint32_t(-1);

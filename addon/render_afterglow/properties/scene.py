@@ -136,7 +136,7 @@ class AfterglowSceneSettings(bpy.types.PropertyGroup):
         name="Short Rays",
         description="Rays of each record of the instant cache that gather light of near surfaces, once a first picture stands: "
         "corners are not too dark and walls are even. The bounding distance is then 4 at least; 0: none",
-        default=32,
+        default=16,
         min=0,
         max=1024,
         soft_max=64,
