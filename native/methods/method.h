@@ -77,6 +77,7 @@ struct Work {
   const std::atomic<bool>* pause = nullptr;       // while true, no new request is begun
   std::atomic<uint64_t>* samples_done = nullptr;  // grows as requests are finished
   bool lazy = false;                              // update() may leave to refine() what a first picture can do without
+  bool left = false;                              // it did
   float caching = 1.0f;  // share of the paths that fill a cache beyond what answers need: see caching_share()
   bool extra = false;    // requests ask for more samples where the picture is noisy: methods answer from what they have
 };

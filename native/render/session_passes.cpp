@@ -26,7 +26,7 @@ constexpr double kFinerStart = 1.0 / 3.0;
 /// A viewport's first picture does not wait for rays that only look.
 constexpr uint32_t kLooksFrom = 2;
 /// In which a first picture reaches the screen before all cores are busy with what comes after it.
-constexpr std::chrono::milliseconds kDrawn(70);
+constexpr double kDrawn = 0.07;
 /// Passes for the pixels that an edit left without samples, before those are asked that seem untouched.
 constexpr uint32_t kCaughtUp = 6;
 
@@ -183,8 +183,9 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
         at_last_publish = now();
       }
     }
-    const bool refines = std::exchange(work.lazy, false);
-    if (refines) std::this_thread::sleep_for(kDrawn);
+    const bool refines = std::exchange(work.left, false);
+    for (const double shown = now(); refines && !stop_ && now() - shown < kDrawn;)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
     if (refines && !stop_ && renderer.refine(*scene_, work)) {
       if (stop_) break;
       film.begin_asking();  // as after an edit

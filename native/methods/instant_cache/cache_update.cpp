@@ -75,7 +75,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   LightEmission::surrounding_ball(scene.scene.bounds(), center, radius);
   const float bound = settings_.lights.bound_length(scene.scene.bounds());
   const bool coloured = scene.effects.has(kTransparency) || !shown.empty();
-  lazy_ = work.lazy && settings_.lights.short_rays;
+  lazy_ = work.left = work.lazy && settings_.lights.short_rays;
   stale_ |= changes.everything || changes.origin || shown != shown_;
   // Another ball around the scene: all sums are made anew, and the lights whose paths begin on it move. Visibility
   // stays.
