@@ -38,21 +38,22 @@ Answer Cache::answer(const CachePoint& p) const {
   float weights = 0.0f;
   Rgb sum(0.0f);
   bool waits = false;
-  octree_.find(p.position, 1.0f / limit, [&](const Entry& e) {
-    const float distance = distance_to_record(e, p, limit, spacing_.angle_scale);
-    if (distance >= 1.0f) return true;
-    const Record& record = records_[e.record];
+  std::vector<uint32_t> near;
+  octree_.find_near({p.position, p.position}, 1.0f / limit, p.instance, near);
+  for (const uint32_t r : near) {
+    const float distance = distance_to_record(octree_.entry(r), p, limit, spacing_.angle_scale);
+    if (distance >= 1.0f) continue;
+    const Record& record = records_[r];
     if (!record.ready) {
-      std::atomic_ref(wanted_[e.record]).store(1, std::memory_order_relaxed);
+      std::atomic_ref(wanted_[r]).store(1, std::memory_order_relaxed);
       waits = true;
-      return true;
+      continue;
     }
-    note_use(e.record);
+    note_use(r);
     const float weight = record_weight(distance);
     weights += weight;
     sum += weight * light_at(record, p);
-    return true;
-  });
+  }
   if (!(weights > 0.0f) || waits) return result;
   result.light = sum / weights;
   result.weight = 1.0f;
@@ -68,8 +69,8 @@ void Cache::note_use(uint32_t record) const {
 bool Cache::covered(const CachePoint& p) const {
   const float limit = spacing_.most_pixels * p.footprint;
   bool found = false;
-  octree_.find(p.position, 1.0f / limit, [&](const Entry& e) {
-    const float distance = distance_to_record(e, p, limit, spacing_.angle_scale);
+  octree_.visit_near({p.position, p.position}, 1.0f / limit, [&](uint32_t r) {
+    const float distance = distance_to_record(octree_.entry(r), p, limit, spacing_.angle_scale);
     found = distance < 1.0f && record_weight(distance) > kCoveringWeight;
     return !found;
   });
@@ -85,6 +86,8 @@ bool Cache::insert(const CommittedScene& scene, const CachePoint& p) {
   record.reach = record.radius = std::max(spacing_.most_pixels * p.footprint, 1e-6f * radius_);
   record.born = record.asked = update_;
   octree_.insert(uint32_t(records_.size()), record, record.reach);
+  const size_t size = records_.size() + 1;
+  make_room(records_, size), make_room(used_, size), make_room(wanted_, size);
   records_.push_back(record);
   used_.push_back(update_);
   wanted_.push_back(0);

@@ -69,6 +69,8 @@ void VisibilityTable::set_coloured(bool coloured) {
 
 void VisibilityTable::add_row() {
   rows_++;
+  for (std::vector<uint64_t>* bits : {&seen_, &unknown_, &facing_}) make_room(*bits, rows_ * words_);
+  if (coloured_) make_room(transmittance_, rows_ * slots_);
   seen_.resize(rows_ * words_, 0);
   facing_.resize(rows_ * words_, ~uint64_t(0));
   unknown_.resize(rows_ * words_, ~uint64_t(0));

@@ -52,11 +52,12 @@ Answer Cache::show(View view, const CachePoint& p) const {
   const float limit = spacing_.most_pixels * p.footprint;
   float best = 1.0f;
   uint32_t record = kNone;
-  octree_.find(p.position, 1.0f / limit, [&](const Entry& e) {
-    const float distance = distance_to_record(e, p, limit, spacing_.angle_scale);
-    if (distance < best) best = distance, record = e.record;
-    return true;
-  });
+  std::vector<uint32_t> near;
+  octree_.find_near({p.position, p.position}, 1.0f / limit, p.instance, near);
+  for (const uint32_t r : near) {
+    const float distance = distance_to_record(octree_.entry(r), p, limit, spacing_.angle_scale);
+    if (distance < best) best = distance, record = r;
+  }
   if (record == kNone) return {};
   const Record& r = records_[record];
   Rgb colour(0.0f);
