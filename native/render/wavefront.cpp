@@ -65,14 +65,34 @@ void walk(const path_tracing::KernelInput& input, WalkKernel kernel, std::span<c
   times.points += points;
 }
 
-void gather(const IndirectMethod& method, const CommittedScene& scene, std::span<const CachePoint> points,
-            std::span<Answer> answers, const Work& work) {
+void gather(const IndirectMethod& method, const CommittedScene& scene, Wavefront& wave, const Work& work) {
+  const std::span<const CachePoint> points = wave.points;
+  const std::span<Answer> answers = wave.answers;
+  wave.unanswered.assign((points.size() + kGatherBlock - 1) / kGatherBlock, 0);
   parallel_blocks(
       points.size(), kGatherBlock, work.threads,
       [&](size_t begin, size_t end) {
-        method.gather(scene, points.subspan(begin, end - begin), answers.subspan(begin, end - begin));
+        const std::span<Answer> own = answers.subspan(begin, end - begin);
+        method.gather(scene, points.subspan(begin, end - begin), own);
+        wave.unanswered[begin / kGatherBlock] =
+            uint32_t(std::count_if(own.begin(), own.end(), [](const Answer& a) { return !(a.weight > 0.0f); }));
       },
       work.stop);
+}
+
+/// Points without an answer; only blocks that have any are looked at again.
+std::span<const CachePoint> find_holes(Wavefront& wave) {
+  size_t count = 0;
+  for (const uint32_t unanswered : wave.unanswered) count += unanswered;
+  if (count == wave.points.size()) return wave.points;
+  wave.hole_points.clear();
+  for (size_t block = 0; block < wave.unanswered.size(); ++block) {
+    if (!wave.unanswered[block]) continue;
+    const size_t end = std::min((block + 1) * kGatherBlock, wave.points.size());
+    for (size_t i = block * kGatherBlock; i < end; ++i)
+      if (!(wave.answers[i].weight > 0.0f)) wave.hole_points.push_back(wave.points[i]);
+  }
+  return wave.hole_points;
 }
 
 /// Asks, lets the method fill what it could not answer, and asks again.
@@ -84,21 +104,15 @@ void answer(IndirectMethod& method, const CommittedScene& scene, Wavefront& wave
       method.prepare(scene, wave.points, work);
     }
     const Stopwatch watch(times.gather);
-    gather(method, scene, wave.points, wave.answers, work);
+    gather(method, scene, wave, work);
     return;
   }
-  std::span<const CachePoint> holes = wave.points;
+  std::span<const CachePoint> holes;
   {
     const Stopwatch watch(times.gather);
-    gather(method, scene, wave.points, wave.answers, work);
-    wave.holes.clear();
-    for (size_t i = 0; i < wave.points.size(); ++i)
-      if (!(wave.answers[i].weight > 0.0f)) wave.holes.push_back(uint32_t(i));
-    if (wave.holes.size() < wave.points.size()) {
-      wave.hole_points.clear();
-      for (const uint32_t i : wave.holes) wave.hole_points.push_back(wave.points[i]);
-      holes = wave.hole_points;
-    }
+    gather(method, scene, wave, work);
+    if (work.stop.stop()) return;
+    holes = find_holes(wave);
   }
   times.holes += holes.size();
   if (holes.empty() || work.stop.stop()) return;
@@ -108,7 +122,7 @@ void answer(IndirectMethod& method, const CommittedScene& scene, Wavefront& wave
   }
   if (work.stop.stop()) return;
   const Stopwatch watch(times.gather);
-  gather(method, scene, wave.points, wave.answers, work);  // what was answered before may have a nearer record now
+  gather(method, scene, wave, work);  // what was answered before may have a nearer record now
 }
 
 /// The pixels of a wavefront, in steps of their pass.

@@ -51,7 +51,7 @@ struct Wavefront {
   std::vector<WalkedRequest> requests;
   std::vector<CachePoint> points;
   std::vector<Answer> answers;
-  std::vector<uint32_t> holes;  // points without an answer
+  std::vector<uint32_t> unanswered;  // points without an answer, in each block of them
   std::vector<CachePoint> hole_points;
   std::vector<size_t> first;  // of each request's points
   LayeredFilter filter;

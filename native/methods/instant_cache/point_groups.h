@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Points that ask, taken together where they stand close on one object: the octree is descended once for all of them,
-// and each record that it finds is compared with all of them in vector registers. The same tests and weights as in
-// interpolation.h, a column for each number.
+// and each record that it finds is compared in vector registers with those rows of eight points that it may reach. The
+// same tests and weights as in interpolation.h, a column for each number.
 #pragma once
 
 #include <span>
@@ -10,8 +10,11 @@
 
 namespace afterglow::instant_cache {
 
+/// A row of points in registers; the compiler splits it where they are narrower.
+using Lanes = float __attribute__((vector_size(32)));
+
 struct PointGroup {
-  static constexpr uint32_t kMost = 64, kLanes = 16;
+  static constexpr uint32_t kMost = 256, kLanes = 8, kRows = kMost / kLanes;
   uint32_t instance = kNone, count = 0;
   Box around;
   float limit = 0.0f;  // the largest radius that any point allows
@@ -19,6 +22,7 @@ struct PointGroup {
   bool bumped = false;                                 // any lobe's normal differs; else the next columns are not set
   float bx[kMost], by[kMost], bz[kMost], bend[kMost];  // by which they differ; and their cosine, less 1
   uint32_t point[kMost];
+  float lower[3][kRows], upper[3][kRows];  // boxes around rows of kLanes points each
 
   /// Whether the point may join without making the group much wider than records are.
   bool takes(const CachePoint& p) const {
@@ -36,6 +40,12 @@ struct PointGroup {
     const float reach = most_pixels * p.footprint;
     around.extend(p.position);
     limit = std::max(limit, reach);
+    const uint32_t row = count / kLanes;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float at = p.position[axis];
+      lower[axis][row] = count % kLanes ? std::min(lower[axis][row], at) : at;
+      upper[axis][row] = count % kLanes ? std::max(upper[axis][row], at) : at;
+    }
     x[count] = p.position.x, y[count] = p.position.y, z[count] = p.position.z;
     nx[count] = p.normal.x, ny[count] = p.normal.y, nz[count] = p.normal.z;
     if (p.bent != p.normal) bump(p);
@@ -50,10 +60,13 @@ struct PointGroup {
     bx[count] = by_bump.x, by[count] = by_bump.y, bz[count] = by_bump.z;
     bend[count] = glm::dot(p.bent, p.normal) - 1.0f;
   }
-  uint32_t padded() const { return (count + kLanes - 1) / kLanes * kLanes; }
-  /// Lanes without a point stand where nothing is.
+  uint32_t rows() const { return (count + kLanes - 1) / kLanes; }
+  uint32_t all_rows() const { return uint32_t((uint64_t(1) << rows()) - 1); }
+  /// Lanes without a point stand where nothing is; rows without one, too.
   void pad() {
-    const uint32_t end = std::min(padded(), kMost);  // said to the compiler, which cannot know that count is
+    for (int axis = 0; axis < 3; ++axis)
+      for (uint32_t row = rows(); row < kRows; ++row) lower[axis][row] = upper[axis][row] = 1e18f;
+    const uint32_t end = std::min(rows() * kLanes, kMost);  // said to the compiler, which cannot know that count is
     for (uint32_t i = count; i < end; ++i) {
       x[i] = y[i] = z[i] = 1e18f;
       nx[i] = ny[i] = nz[i] = inverse_limit[i] = 0.0f;
@@ -65,7 +78,7 @@ struct PointGroup {
 /// whether.
 template <class At, class Wants, class Visit>
 void in_groups(uint32_t count, float most_pixels, const At& at, const Wants& wants, const Visit& visit) {
-  constexpr uint32_t kOpen = 4;
+  constexpr uint32_t kOpen = 4, kAhead = 16;
   PointGroup open[kOpen];
   uint32_t next = 0;
   const auto close = [&](PointGroup& group) {
@@ -73,6 +86,9 @@ void in_groups(uint32_t count, float most_pixels, const At& at, const Wants& wan
     group.count = 0;
   };
   for (uint32_t i = 0; i < count; ++i) {
+    // Rounds of filling take points from here and there: memory would be waited for at each.
+    const char* ahead = reinterpret_cast<const char*>(&at(std::min(i + kAhead, count - 1)));
+    __builtin_prefetch(ahead), __builtin_prefetch(ahead + 64);
     if (!wants(i)) continue;
     const CachePoint& p = at(i);
     PointGroup* group = nullptr;
@@ -92,55 +108,87 @@ void in_groups(uint32_t count, float most_pixels, const At& at, const Wants& wan
   for (PointGroup& g : open) close(g);
 }
 
-/// How much a record counts at each point of the group, [padded()]. False: nowhere.
-inline bool record_weights(const Entry& e, const PointGroup& g, float angle_scale, float* weights) {
-  const Vec3 at = e.position, n = e.normal;
-  const uint32_t size = g.padded();
-  const float own = e.inverse_radius;
-  for (uint32_t i = 0; i < size; ++i) {
-    const float dx = g.x[i] - at.x, dy = g.y[i] - at.y, dz = g.z[i] - at.z;
-    const float inverse = own > g.inverse_limit[i] ? own : g.inverse_limit[i];
-    const float d2 = (dx * dx + dy * dy + dz * dz) * (inverse * inverse);
-    const float turn = 1.0f - (n.x * g.nx[i] + n.y * g.ny[i] + n.z * g.nz[i]);
-    const float left = 1.0f - std::sqrt(d2) - angle_scale * std::sqrt(turn > 0.0f ? turn : 0.0f);
-    const float off = (dx * (n.x + g.nx[i]) + dy * (n.y + g.ny[i]) + dz * (n.z + g.nz[i])) * (0.5f * inverse);
-    const float inside = left > 0.0f ? left : 0.0f;
-    weights[i] = inside * (std::fabs(off) < 0.1f ? inside : 0.0f);
+/// Bits of the group's rows that the record may reach.
+inline uint32_t rows_near(const Entry& e, const PointGroup& g) {
+  const float inverse = std::max(e.inverse_radius, 1.0f / g.limit);
+  uint8_t near[PointGroup::kRows];
+  for (uint32_t i = 0; i < PointGroup::kRows; ++i) {
+    const float dx = std::max(std::max(g.lower[0][i] - e.position.x, e.position.x - g.upper[0][i]), 0.0f);
+    const float dy = std::max(std::max(g.lower[1][i] - e.position.y, e.position.y - g.upper[1][i]), 0.0f);
+    const float dz = std::max(std::max(g.lower[2][i] - e.position.z, e.position.z - g.upper[2][i]), 0.0f);
+    near[i] = (dx * dx + dy * dy + dz * dz) * (inverse * inverse) < 1.0001f;
   }
-  uint32_t any = 0;
-  for (uint32_t i = 0; i < size; ++i) any |= std::bit_cast<uint32_t>(weights[i]);
-  return any != 0;
+  uint32_t bits = 0;
+  for (uint32_t i = 0; i < PointGroup::kRows; i += 8) {
+    uint64_t bytes;
+    std::memcpy(&bytes, near + i, sizeof(bytes));
+    bits |= uint32_t(bytes * 0x0102040810204080ull >> 56) << i;
+  }
+  return bits;
 }
 
-/// Weights times the record's light at each point (light_at()), added up.
-inline void add_light(const Record& r, const PointGroup& g, const float* weights, float* sum_r, float* sum_g,
-                      float* sum_b) {
-  const uint32_t size = g.padded();
-  float* sums[3] = {sum_r, sum_g, sum_b};
-  const Vec3 at = r.position, n = r.normal;
-  for (int c = 0; c < 3; ++c) {
-    const float here = r.irradiance[c], low = 0.5f * here, high = 2.0f * here;
-    const float sx = r.by_step[0][c], sy = r.by_step[1][c], sz = r.by_step[2][c];
-    const float tx = r.by_turn[0][c], ty = r.by_turn[1][c], tz = r.by_turn[2][c];
-    float* sum = sums[c];
-    if (g.bumped) {
-      for (uint32_t i = 0; i < size; ++i) {
-        const float line = here + sx * (g.x[i] - at.x) + sy * (g.y[i] - at.y) + sz * (g.z[i] - at.z) +
-                           tx * (g.nx[i] - n.x) + ty * (g.ny[i] - n.y) + tz * (g.nz[i] - n.z);
-        const float light = std::min(std::max(line, low), high);
-        const float turned = light + here * g.bend[i] + tx * g.bx[i] + ty * g.by[i] + tz * g.bz[i];
-        const float bounded = std::min(std::max(turned, 0.0f), 2.0f * light);
-        sum[i] += weights[i] * (g.bend[i] != 0.0f ? bounded : light);
-      }
-      continue;
-    }
-    for (uint32_t i = 0; i < size; ++i) {
-      const float line = here + sx * (g.x[i] - at.x) + sy * (g.y[i] - at.y) + sz * (g.z[i] - at.z) +
-                         tx * (g.nx[i] - n.x) + ty * (g.ny[i] - n.y) + tz * (g.nz[i] - n.z);
-      const float above = line > low ? line : low;
-      sum[i] += weights[i] * (above < high ? above : high);
-    }
-  }
+inline Lanes lanes(const float* from) {
+  Lanes v;
+  std::memcpy(&v, from, sizeof(v));
+  return v;
+}
+inline Lanes square_root(const Lanes& v) {
+  float values[PointGroup::kLanes];
+  std::memcpy(values, &v, sizeof(v));
+  for (float& value : values) value = std::sqrt(value);
+  return lanes(values);
+}
+inline Lanes larger(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
+inline Lanes smaller(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
+inline bool any_above(const Lanes& v, const Lanes& bound) {
+  const auto above = v > bound;
+  uint64_t words[sizeof(v) / 8], any = 0;
+  std::memcpy(words, &above, sizeof(above));
+  for (const uint64_t w : words) any |= w;
+  return any != 0;
+}
+inline bool all_above(const Lanes& v, const Lanes& bound) {
+  const auto above = v > bound;
+  uint64_t words[sizeof(v) / 8], all = ~uint64_t(0);
+  std::memcpy(words, &above, sizeof(above));
+  for (const uint64_t w : words) all &= w;
+  return all == ~uint64_t(0);
+}
+
+/// A record seen from a row of points: the way to each point from it, and how much it counts there.
+struct RowOfPoints {
+  Lanes dx, dy, dz, weight;
+};
+inline RowOfPoints compare(const Entry& e, const PointGroup& g, uint32_t row, float angle_scale) {
+  const uint32_t first = row * PointGroup::kLanes;
+  const Vec3 at = e.position, n = e.normal;
+  const Lanes dx = lanes(g.x + first) - at.x, dy = lanes(g.y + first) - at.y, dz = lanes(g.z + first) - at.z;
+  const Lanes nx = lanes(g.nx + first), ny = lanes(g.ny + first), nz = lanes(g.nz + first), none = {};
+  const Lanes inverse = larger(none + e.inverse_radius, lanes(g.inverse_limit + first));
+  const Lanes d2 = (dx * dx + dy * dy + dz * dz) * (inverse * inverse);
+  const Lanes turn = 1.0f - (n.x * nx + n.y * ny + n.z * nz);
+  const Lanes left = 1.0f - square_root(d2) - angle_scale * square_root(larger(turn, none));
+  const Lanes off = (dx * (n.x + nx) + dy * (n.y + ny) + dz * (n.z + nz)) * (0.5f * inverse);
+  const Lanes inside = larger(left, none);
+  return {dx, dy, dz, inside * ((off < 0.1f) & (off > -0.1f) ? inside : none)};
+}
+
+/// The record's light at each point of the row (light_at()), in one colour.
+inline Lanes light_at(const Record& r, int c, const PointGroup& g, uint32_t row, const RowOfPoints& p) {
+  const uint32_t first = row * PointGroup::kLanes;
+  const float here = r.irradiance[c];
+  const Vec3 n = r.normal;
+  const float sx = r.by_step[0][c], sy = r.by_step[1][c], sz = r.by_step[2][c];
+  const float tx = r.by_turn[0][c], ty = r.by_turn[1][c], tz = r.by_turn[2][c];
+  const Lanes none = {};
+  const Lanes line = here + sx * p.dx + sy * p.dy + sz * p.dz + tx * (lanes(g.nx + first) - n.x) +
+                     ty * (lanes(g.ny + first) - n.y) + tz * (lanes(g.nz + first) - n.z);
+  const Lanes light = smaller(larger(line, none + 0.5f * here), none + 2.0f * here);
+  if (!g.bumped) return light;
+  const Lanes bend = lanes(g.bend + first);
+  const Lanes turned =
+      light + here * bend + tx * lanes(g.bx + first) + ty * lanes(g.by + first) + tz * lanes(g.bz + first);
+  return bend != 0.0f ? smaller(larger(turned, none), 2.0f * light) : light;
 }
 
 }  // namespace afterglow::instant_cache
