@@ -2,6 +2,7 @@
 // What a place receives of virtual lights: their bounded geometry terms in columns (Debattista et al. 2009, (2), (3)),
 // the terms' slopes (Ward and Heckbert 1992), and the rays that ask which are seen. Declared in virtual_lights.h.
 #include <algorithm>
+#include <cstring>
 
 #include "transport/virtual_lights.h"
 
@@ -39,40 +40,78 @@ void geometry_terms(const VirtualLightColumns& c, const Vec3& p, const Vec3& n, 
     float t = bound > 0.0f ? (std::sqrt(d2) - near) * scale : 1.0f;
     t = std::min(std::max(t, 0.0f), 1.0f);
     const float f = t * t * (3.0f - 2.0f * t);
-    const float g = here * there / d2 / d2 * f;
+    const float nearness = 1.0f / d2;  // one division: they are what the loop waits for
+    const float g = here * there * nearness * nearness * f;
     out[i] = two_sided ? g : std::max(g, 0.0f);
   }
 }
 
-void geometry_slopes(const VirtualLightColumns& c, const Vec3& p, const Frame& frame, float bound,
-                     GeometrySlopes& out) {
+namespace {
+
+constexpr uint32_t kLanes = 8;
+using Lanes = float __attribute__((vector_size(4 * kLanes)));  // the compiler splits it where registers are narrower
+
+Lanes lanes(const std::vector<float>& column, size_t first) {
+  Lanes v;
+  std::memcpy(&v, column.data() + first, sizeof(v));
+  return v;
+}
+
+Lanes square_root(const Lanes& v) {
+  float values[kLanes];
+  std::memcpy(values, &v, sizeof(v));
+  for (float& value : values) value = std::sqrt(value);
+  Lanes root;
+  std::memcpy(&root, values, sizeof(root));
+  return root;
+}
+
+/// Always in the same order.
+Rgb total(const Lanes (&sums)[3]) {
+  Rgb result;
+  for (int c = 0; c < 3; ++c) {
+    const Lanes& s = sums[c];
+    result[c] = ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+  }
+  return result;
+}
+
+}  // namespace
+
+LightSums sum_lights(const VirtualLightColumns& lights, const std::vector<float> (&seen)[3], bool tinted, const Vec3& p,
+                     const Frame& frame, float bound) {
   const float near = 0.8f * bound, scale = bound > 0.0f ? 1.0f / (0.4f * bound) : 0.0f;
   const Vec3 t = frame.t, b = frame.b, n = frame.n;
-  const size_t size = c.padded();
-  out.resize(size);
-  const float *x = c.x.data(), *y = c.y.data(), *z = c.z.data(), *nx = c.nx.data(), *ny = c.ny.data(),
-              *nz = c.nz.data();
-  float *step_t = out.step_t.data(), *step_b = out.step_b.data(), *turn_t = out.turn_t.data(),
-        *turn_b = out.turn_b.data();
-  const float least = c.two_sided ? -kInfinity : 0.0f;
-#pragma GCC ivdep
-  for (size_t i = 0; i < size; ++i) {
-    const float dx = x[i] - p.x, dy = y[i] - p.y, dz = z[i] - p.z;
-    const float d2 = std::max(dx * dx + dy * dy + dz * dz, 1e-30f), d = std::sqrt(d2);
-    const float here = dx * n.x + dy * n.y + dz * n.z;
-    const float there = -(dx * nx[i] + dy * ny[i] + dz * nz[i]);
-    float s = bound > 0.0f ? (d - near) * scale : 1.0f;
-    s = std::min(std::max(s, 0.0f), 1.0f);
-    const float f = s * s * (3.0f - 2.0f * s), slope = 6.0f * s * (1.0f - s) * scale;  // of the bound
-    const float over_d4 = 1.0f / d2 / d2, above = here > 0.0f ? over_d4 : 0.0f, lit = there > least ? above : 0.0f;
+  const float least = lights.two_sided ? -kInfinity : 0.0f;
+  const Lanes none = {}, one = none + 1.0f;
+  Lanes light[3] = {}, step_t[3] = {}, step_b[3] = {}, turn_t[3] = {}, turn_b[3] = {};
+  for (size_t i = 0; i < lights.padded(); i += kLanes) {
+    const Lanes dx = lanes(lights.x, i) - p.x, dy = lanes(lights.y, i) - p.y, dz = lanes(lights.z, i) - p.z;
+    const Lanes nx = lanes(lights.nx, i), ny = lanes(lights.ny, i), nz = lanes(lights.nz, i);
+    const Lanes square = dx * dx + dy * dy + dz * dz, d2 = square > 1e-30f ? square : none + 1e-30f;
+    const Lanes d = square_root(d2), nearness = 1.0f / d2;
+    const Lanes here = dx * n.x + dy * n.y + dz * n.z, there = -(dx * nx + dy * ny + dz * nz);
+    Lanes s = bound > 0.0f ? (d - near) * scale : one;
+    s = s > 0.0f ? s : none;
+    s = s < 1.0f ? s : one;
+    const Lanes f = s * s * (3.0f - 2.0f * s), slope = 6.0f * s * (1.0f - s) * scale;  // of the bound
+    const Lanes lit = (here > 0.0f) & (there > least) ? nearness * nearness : none;
     // Only the way to the light changes, by −step: cos of the place stays for steps along its plane.
-    const float facing = lit * f * here, nearer = lit * here * there * (4.0f * f / d2 - slope / d);
-    const float along_t = dx * t.x + dy * t.y + dz * t.z, along_b = dx * b.x + dy * b.y + dz * b.z;
-    step_t[i] = facing * (nx[i] * t.x + ny[i] * t.y + nz[i] * t.z) + nearer * along_t;
-    step_b[i] = facing * (nx[i] * b.x + ny[i] * b.y + nz[i] * b.z) + nearer * along_b;
-    turn_t[i] = lit * f * there * along_t;
-    turn_b[i] = lit * f * there * along_b;
+    const Lanes facing = lit * f * here, turned = lit * f * there, term = facing * there;
+    const Lanes nearer = lit * here * there * (4.0f * f - slope * d) * nearness;
+    const Lanes along_t = dx * t.x + dy * t.y + dz * t.z, along_b = dx * b.x + dy * b.y + dz * b.z;
+    const Lanes by_t = facing * (nx * t.x + ny * t.y + nz * t.z) + nearer * along_t;
+    const Lanes by_b = facing * (nx * b.x + ny * b.y + nz * b.z) + nearer * along_b;
+    for (int c = 0; c < 3; ++c) {
+      Lanes shines = lanes(lights.front[c], i);
+      if (lights.two_sided) shines = term > 0.0f ? shines : -lanes(lights.back[c], i);
+      shines *= lanes(seen[tinted ? c : 0], i);
+      light[c] += term * shines;
+      step_t[c] += by_t * shines, step_b[c] += by_b * shines;
+      turn_t[c] += turned * along_t * shines, turn_b[c] += turned * along_b * shines;
+    }
   }
+  return {total(light), total(step_t), total(step_b), total(turn_t), total(turn_b)};
 }
 
 bool can_see(const Vec3& position, const Vec3& face_normal, const VirtualLight& light, bool front) {

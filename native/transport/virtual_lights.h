@@ -74,15 +74,15 @@ inline void geometry_terms(const VirtualLightColumns& lights, const Vec3& positi
   geometry_terms(lights, position, normal, bound, out, 0, lights.padded());
 }
 
-/// The same terms' derivatives, [padded()] each: over steps along t and b (of a frame whose normal is the place's), and
-/// over turns of the normal towards t and b. As in Ward and Heckbert 1992, but exact, since each light is known.
-struct GeometrySlopes {
-  std::vector<float> step_t, step_b, turn_t, turn_b;
-  void resize(size_t size) {
-    for (auto* column : {&step_t, &step_b, &turn_t, &turn_b}) column->resize(size);
-  }
+/// What all lights together send to a place, and its derivatives: over steps along t and b (of a frame whose normal is
+/// the place's), and over turns of the normal towards t and b. As in Ward and Heckbert 1992, but exact, since each
+/// light is known.
+struct LightSums {
+  Rgb light, step_t, step_b, turn_t, turn_b;
 };
-void geometry_slopes(const VirtualLightColumns&, const Vec3& position, const Frame&, float bound, GeometrySlopes& out);
+/// seen: the share of each light that arrives, [padded()]; tinted: in each colour, else the first holds for all.
+LightSums sum_lights(const VirtualLightColumns&, const std::vector<float> (&seen)[3], bool tinted, const Vec3& position,
+                     const Frame&, float bound);
 
 /// Whether both faces (not only the smooth normals) look at each other. front: the side that shines.
 bool can_see(const Vec3& position, const Vec3& face_normal, const VirtualLight&, bool front);

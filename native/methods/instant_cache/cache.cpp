@@ -3,6 +3,7 @@
 #include "methods/instant_cache/cache.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <chrono>
@@ -24,6 +25,20 @@ uint32_t round_of(const CachePoint& p) {
   return both % 16 == 0 ? 0 : both % 8 == 0 ? 1 : both % 4 == 0 ? 2 : both % 2 == 0 ? 3 : 4;
 }
 constexpr uint32_t kRounds = 5;
+
+/// The points of each round, in their order.
+std::array<std::vector<uint32_t>, kRounds> in_rounds(std::span<const CachePoint> points, unsigned threads) {
+  std::vector<uint8_t> round(points.size());
+  parallel_blocks(points.size(), 4096, threads, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) round[i] = uint8_t(round_of(points[i]));
+  });
+  std::array<size_t, kRounds> sizes{};
+  for (const uint8_t r : round) sizes[r]++;
+  std::array<std::vector<uint32_t>, kRounds> rounds;
+  for (uint32_t r = 0; r < kRounds; ++r) rounds[r].reserve(sizes[r]);
+  for (uint32_t i = 0; i < round.size(); ++i) rounds[round[i]].push_back(i);
+  return rounds;
+}
 
 }  // namespace
 
@@ -105,8 +120,7 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
     if (wanted_[i]) wanted.push_back(i), wanted_[i] = 0;
   counts_.updated += wanted.size();
   counts_.update_rays += resolve(scene, wanted, work);
-  std::vector<std::vector<uint32_t>> rounds(kRounds);
-  for (uint32_t i = 0; i < points.size(); ++i) rounds[round_of(points[i])].push_back(i);
+  std::array<std::vector<uint32_t>, kRounds> rounds = in_rounds(points, work.threads);
   // A record's radius is known when its light is, and may turn out smaller than it was taken for while records were
   // chosen: points that new records seemed to cover are asked again. Each repeat brings at least one record.
   std::vector<uint8_t> open;
@@ -160,8 +174,10 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
           Record& record = records_[which[i]];
           if (settings_.lights.short_rays && !lazy_)
             record.compensation = nearby_.repair(which[i], nearby, record, counts);
-          ask(walked, which[i], sums.terms.data(), counts);  // leaves the record's terms
-          sum(which[i], sums);
+          // Most of what an edit makes unknown turns out to be as it was: then so is the sum, to the last bit.
+          const bool changed = ask(walked, which[i], sums.terms.data(), counts);
+          if (changed || !record.summed || settings_.lights.short_rays) sum(which[i], sums);
+          record.ready = true;
         }
         rays += counts.shadow + counts.bounce;
       },
@@ -172,14 +188,17 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
   return rays;
 }
 
-void Cache::ask(const WalkScene& walked, size_t index, float* terms, RayCounts& counts) {
+bool Cache::ask(const WalkScene& walked, size_t index, float* terms, RayCounts& counts) {
   Record& record = records_[index];
   const uint64_t rays_before = counts.shadow;
-  geometry_terms(lights_, record.position, record.normal, bound_, terms);
+  bool changed = false;
   const Vec3 from = record.position + record.error * record.face_normal;
   uint64_t *unknown = visibility_.unknown(index), *facing = visibility_.facing(index);
   const bool few = moved_rays_ && index * visibility_.words() < only_moved_.size();
   for (uint32_t w = 0; w < visibility_.words(); ++w) {
+    if (!unknown[w]) continue;
+    geometry_terms(lights_, record.position, record.normal, bound_, terms + 64 * w, 64 * w,
+                   std::min(lights_.padded() - 64 * w, 64u));
     const uint64_t quick = few ? only_moved_[index * visibility_.words() + w] : 0;
     for (uint64_t bits = unknown[w]; bits; bits &= bits - 1) {
       const uint64_t bit = bits & -bits;
@@ -191,15 +210,17 @@ void Cache::ask(const WalkScene& walked, size_t index, float* terms, RayCounts& 
       facing[w] = asks ? facing[w] | bit : facing[w] & ~bit;
       if (asks && (quick & bit)) {  // was seen, and nothing else can hide it
         counts.shadow++;
-        if (moved_rays_->occluded(visibility_ray(from, light))) visibility_.set(index, k, Rgb(0.0f));
+        if (moved_rays_->occluded(visibility_ray(from, light))) changed |= visibility_.set(index, k, Rgb(0.0f));
       } else {
-        visibility_.set(index, k, asks ? visibility(walked, visibility_ray(from, light), counts) : Rgb(0.0f));
+        changed |=
+            visibility_.set(index, k, asks ? visibility(walked, visibility_ray(from, light), counts) : Rgb(0.0f));
       }
     }
     unknown[w] = 0;
   }
   record.rays = uint32_t(counts.shadow - rays_before);
   if (record.rays) record.asked = update_;
+  return changed;
 }
 
 Verification Cache::verify(const CommittedScene& scene, Work& work) const {

@@ -52,9 +52,8 @@ constexpr float kAsItIs = 2.0f;  // an answer's weight: no light, a colour that 
 
 /// Memory that threads use for one record after the other: a value for each light.
 struct Sums {
-  std::vector<float> terms, light[3];  // geometry_terms(); what is seen of each colour of light
-  std::vector<float> front, back;      // luminance that arrives from either side of what is seen
-  GeometrySlopes slopes;
+  std::vector<float> terms, seen[3];  // geometry_terms(); the share of each light that arrives, as for sum_lights()
+  std::vector<float> front, back;     // luminance that arrives from either side of what is seen
 };
 
 class Cache {
@@ -84,6 +83,8 @@ class Cache {
   void follow(const CommittedScene&, const std::vector<Moved>&);
   void mark_crossings(const std::vector<Moved>&, Work&);
   void prepare_moved_rays(const CommittedScene&, const std::vector<Moved>&);
+  void forget_sums();
+  void forget_sums_of(const std::vector<uint64_t>& lights);
   void mark_hidden(size_t record);
   void mark(size_t record, const std::vector<uint64_t>& slots);
   /// What short rays met is marked at once, or by refine().
@@ -108,11 +109,11 @@ class Cache {
   bool insert(const CommittedScene&, const CachePoint&);
   /// Asks what is unknown of these records and sums their light anew.
   uint64_t resolve(const CommittedScene&, std::span<const uint32_t> records, Work&);
-  void ask(const WalkScene&, size_t record, float* terms, RayCounts&);
+  /// Asks what is unknown. Whether anything is seen otherwise than before.
+  bool ask(const WalkScene&, size_t record, float* terms, RayCounts&);
   void sum(size_t record, Sums&);
-  void find_gradients(size_t record, Sums&);
-  void find_light(size_t record, Sums&) const;
-  void find_brightness(size_t record, Sums&) const;
+  void find_seen(size_t record, Sums&) const;
+  void find_brightness(Sums&) const;
   float find_radius(size_t record, Sums&) const;
   ShortRays short_rays(const WalkScene&) const;
   WalkScene walk(const CommittedScene& scene) const {

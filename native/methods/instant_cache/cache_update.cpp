@@ -88,7 +88,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   if (all) {
     reset(scene);
   } else {
-    if (coloured != visibility_.coloured()) visibility_.set_coloured(coloured);
+    if (coloured != visibility_.coloured()) visibility_.set_coloured(coloured), forget_sums();
     if (scaled) rebuild_octree();
   }
   counts_.rays_now = 0;
@@ -115,6 +115,10 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   bool recoloured = false;
   trace_lights(scene, work, moved_slots, recoloured);
   recoloured |= scaled;
+  if (scaled)
+    forget_sums();
+  else if (light_changes_.any)
+    forget_sums_of(light_changes_.other);
   const std::vector<Moved> moved = placement_.update(scene, changes);
   counts_.objects_moved = uint32_t(moved.size());
   follow(scene, moved);
@@ -183,7 +187,7 @@ void Cache::trace_lights(const CommittedScene& scene, Work& work, std::vector<ui
   std::vector<VirtualLight> lights =
       trace_virtual_lights(walk(scene), emission_, settings_.lights.options(settings_.walk.limits, work.threads), rays);
   const uint32_t slots = uint32_t(lights.size());
-  moved_slots.assign(visibility_.words(), 0);
+  moved_slots.assign(visibility_.words(), 0), light_changes_.other = moved_slots;
   light_changes_.any = false;
   light_changes_.grouped.assign(slots / ShortRays::kGroup + 1, 0);
   counts_.lights_moved = counts_.lights_recoloured = counts_.lights = 0;
@@ -196,7 +200,9 @@ void Cache::trace_lights(const CommittedScene& scene, Work& work, std::vector<ui
     if (moved || lit) set_bit(moved_slots, k), counts_.lights_moved++;
     const bool other = !before.same_strength(now);
     if (other) recoloured = true, counts_.lights_recoloured += !moved;
-    if (moved || other) light_changes_.any = true, light_changes_.grouped[k / ShortRays::kGroup] = 1;
+    if (!moved && !other) continue;
+    light_changes_.any = true, light_changes_.grouped[k / ShortRays::kGroup] = 1;
+    set_bit(light_changes_.other, k);
   }
   lights_.fill(std::move(lights));
   front_.assign(visibility_.words(), 0), back_.assign(visibility_.words(), 0);
@@ -234,6 +240,7 @@ void Cache::follow(const CommittedScene& scene, const std::vector<Moved>& moved)
       continue;
     }
     counts_.moved++;
+    record.summed = false;
     follows.push_back(i);
     if (settings_.lights.short_rays) nearby_.forget(i);
     uint64_t* unknown = visibility_.unknown(i);
@@ -257,6 +264,17 @@ void Cache::prepare_moved_rays(const CommittedScene& scene, const std::vector<Mo
     if (m.after.present()) there.push_back(m.instance);
   moved_rays_ = std::make_unique<RaySubset>(scene.rays, there);
   if (!moved_rays_->complete()) moved_rays_.reset();
+}
+
+void Cache::forget_sums() {
+  for (Record& record : records_) record.summed = false;
+}
+
+/// Only what is seen counts in a sum; what comes into sight is found out when it is asked.
+void Cache::forget_sums_of(const std::vector<uint64_t>& lights) {
+  for (size_t i = 0; i < records_.size(); ++i)
+    for (uint32_t w = 0; w < visibility_.words(); ++w)
+      if (visibility_.seen(i)[w] & lights[w]) records_[i].summed = false;
 }
 
 void Cache::mark_hidden(size_t record) {

@@ -17,6 +17,7 @@ struct LightChanges {
   bool lamps = false;            // what Lights::sample answers
   bool any = false;              // of the virtual lights
   std::vector<uint64_t> moved;   // bits of slots whose visibility is unknown
+  std::vector<uint64_t> other;   // bits of slots whose light stands or shines otherwise
   std::vector<uint8_t> grouped;  // for each ShortRays::kGroup slots: whether any of them differs
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <utility>
 
 #include "base/packing.h"
 #include "rays/surface_point.h"
@@ -97,12 +98,13 @@ Rgb VisibilityTable::get(size_t row, uint32_t slot) const {
   return coloured_ ? unpack_transmittance(transmittance_[row * slots_ + slot]) : Rgb(1.0f);
 }
 
-void VisibilityTable::set(size_t row, uint32_t slot, const Rgb& visibility) {
+bool VisibilityTable::set(size_t row, uint32_t slot, const Rgb& visibility) {
   const uint64_t bit = uint64_t(1) << (slot % 64);
   const uint16_t packed = pack_transmittance(visibility);
   uint64_t& word = seen(row)[slot / 64];
-  word = packed ? word | bit : word & ~bit;
-  if (coloured_) transmittance_[row * slots_ + slot] = packed;
+  const uint64_t before = std::exchange(word, packed ? word | bit : word & ~bit);
+  const bool tinted = coloured_ && std::exchange(transmittance_[row * slots_ + slot], packed) != packed;
+  return tinted || word != before;
 }
 
 uint64_t VisibilityTable::could_brighten(size_t row, uint32_t word) const {

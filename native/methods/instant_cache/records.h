@@ -38,6 +38,7 @@ struct Record {
   uint32_t born = 0, asked = 0;            // the updates after which it was made, and rays were last traced for it
   uint32_t rays = 0;                       // so many
   bool ready = false;                      // no visibility is unknown
+  bool summed = false;                     // irradiance is what is known to be seen, of the lights as they are
   Rgb compensation{0.0f};                  // what short rays found; irradiance holds it already
 };
 
@@ -62,7 +63,8 @@ class VisibilityTable {
   uint64_t* seen(size_t row) { return seen_.data() + row * words_; }
   const uint64_t* seen(size_t row) const { return seen_.data() + row * words_; }
   Rgb get(size_t row, uint32_t slot) const;
-  void set(size_t row, uint32_t slot, const Rgb&);
+  /// Whether it was another.
+  bool set(size_t row, uint32_t slot, const Rgb&);
   /// Lights that face the record, as found when they were last asked: the others can do what they want.
   uint64_t* facing(size_t row) { return facing_.data() + row * words_; }
   /// 64 bits: whether an object that comes into the way could change it, and one that leaves it.

@@ -25,27 +25,6 @@ float total(const float* lanes) {
   return part[0];
 }
 
-/// Σ factors · light, in each colour.
-Rgb product(const std::vector<float>& factors, const std::vector<float> (&light)[3], uint32_t size) {
-  Lanes sums[3] = {};
-  for (uint32_t i = 0; i < size; i += kLanes) {
-    Lanes f;
-    std::memcpy(&f, factors.data() + i, sizeof(f));
-    for (int c = 0; c < 3; ++c) {
-      Lanes l;
-      std::memcpy(&l, light[c].data() + i, sizeof(l));
-      sums[c] += f * l;
-    }
-  }
-  Rgb result;
-  for (int c = 0; c < 3; ++c) {
-    float lanes[kLanes];
-    std::memcpy(lanes, &sums[c], sizeof(lanes));
-    result[c] = total(lanes);
-  }
-  return result;
-}
-
 void spread_bits(uint64_t word, uint32_t shift, float* out) {
   const uint32_t bits = uint32_t(word >> shift) & 0xffff;
   for (uint32_t l = 0; l < kLanes; ++l) out[l] = float(bits >> l & 1);
@@ -53,56 +32,37 @@ void spread_bits(uint64_t word, uint32_t shift, float* out) {
 
 }  // namespace
 
-/// What each light sends to the record's place a unit of its geometry term, with the term's sign.
-void Cache::find_light(size_t index, Sums& sums) const {
+/// The share of each light that the record sees.
+void Cache::find_seen(size_t index, Sums& sums) const {
   const uint32_t size = lights_.padded();
   const uint64_t* seen = visibility_.seen(index);
-  for (auto& column : sums.light) column.resize(size);
-  for (uint32_t i = 0; i < size; i += kLanes) {
-    float share[kLanes];
-    spread_bits(seen[i / 64], i % 64, share);
-    const float* terms = sums.terms.data() + i;
-    for (int c = 0; c < 3; ++c) {
-      const float *front = lights_.front[c].data() + i, *back = lights_.back[c].data() + i;
-      Lanes f, b, s, t;
-      std::memcpy(&f, front, sizeof(f)), std::memcpy(&b, back, sizeof(b));
-      std::memcpy(&s, share, sizeof(s)), std::memcpy(&t, terms, sizeof(t));
-      const Lanes light = s * (t > 0.0f ? f : -b);
-      std::memcpy(sums.light[c].data() + i, &light, sizeof(light));
-    }
+  const bool tinted = visibility_.coloured();
+  for (int c = 0; c < (tinted ? 3 : 1); ++c) {
+    sums.seen[c].resize(size);
+    for (uint32_t i = 0; i < size; i += kLanes) spread_bits(seen[i / 64], i % 64, sums.seen[c].data() + i);
   }
-  if (!visibility_.coloured()) return;
+  if (!tinted) return;
   for (uint32_t w = 0; w < visibility_.words(); ++w)
     for (uint64_t bits = seen[w]; bits; bits &= bits - 1) {
       const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
       const Rgb passes = visibility_.get(index, k);
-      for (int c = 0; c < 3; ++c) sums.light[c][k] *= passes[c];
+      for (int c = 0; c < 3; ++c) sums.seen[c][k] = passes[c];
     }
 }
 
-/// Exact for the lights that are seen; what comes into sight or leaves it nearby is left aside.
-void Cache::find_gradients(size_t index, Sums& sums) {
-  Record& record = records_[index];
-  const Frame frame(record.normal);
-  GeometrySlopes& slopes = sums.slopes;
-  geometry_slopes(lights_, record.position, frame, bound_, slopes);
-  const uint32_t size = lights_.padded();
-  const Rgb step_t = product(slopes.step_t, sums.light, size), step_b = product(slopes.step_b, sums.light, size);
-  const Rgb turn_t = product(slopes.turn_t, sums.light, size), turn_b = product(slopes.turn_b, sums.light, size);
-  const bool sound = is_finite(step_t) && is_finite(step_b) && is_finite(turn_t) && is_finite(turn_b);
-  const glm::mat3 none(0.0f);
-  record.by_step = sound ? glm::outerProduct(step_t, frame.t) + glm::outerProduct(step_b, frame.b) : none;
-  record.by_turn = sound ? glm::outerProduct(turn_t, frame.t) + glm::outerProduct(turn_b, frame.b) : none;
-}
-
+/// The gradients are exact for the lights that are seen; what comes into sight or leaves it nearby is left aside.
 void Cache::sum(size_t index, Sums& sums) {
   Record& record = records_[index];
-  find_light(index, sums);
-  const Rgb light = product(sums.terms, sums.light, lights_.padded());
-  record.irradiance = is_finite(light) ? light : Rgb(0.0f);
-  find_gradients(index, sums);
+  find_seen(index, sums);
+  const Frame frame(record.normal);
+  const LightSums of = sum_lights(lights_, sums.seen, visibility_.coloured(), record.position, frame, bound_);
+  record.irradiance = is_finite(of.light) ? of.light : Rgb(0.0f);
+  const bool sound = is_finite(of.step_t) && is_finite(of.step_b) && is_finite(of.turn_t) && is_finite(of.turn_b);
+  const glm::mat3 none(0.0f);
+  record.by_step = sound ? glm::outerProduct(of.step_t, frame.t) + glm::outerProduct(of.step_b, frame.b) : none;
+  record.by_turn = sound ? glm::outerProduct(of.turn_t, frame.t) + glm::outerProduct(of.turn_b, frame.b) : none;
   const float here = luminance(record.irradiance);
-  record.ready = true;
+  record.summed = true;
   if (std::fabs(here - record.measured) > kSameLight * record.measured) {
     record.radius = find_radius(index, sums);
     record.measured = here;
@@ -118,7 +78,7 @@ float Cache::find_radius(size_t index, Sums& sums) const {
   if (!(here > 0.0f)) return record.reach;
   const uint32_t size = lights_.padded();
   const bool two_sided = lights_.two_sided;
-  find_brightness(index, sums);
+  find_brightness(sums);
   const auto light_there = [&](const Vec3& offset) {
     geometry_terms(lights_, record.position + offset, record.normal, bound_, sums.terms.data());
     Lanes sum = {};
@@ -163,31 +123,20 @@ float Cache::find_radius(size_t index, Sums& sums) const {
   return std::min(std::max(radius, least), record.reach);
 }
 
-/// Luminance that arrives from either side of what is seen.
-void Cache::find_brightness(size_t index, Sums& sums) const {
+/// Luminance that arrives from either side of what is seen, as find_seen() told.
+void Cache::find_brightness(Sums& sums) const {
   const uint32_t size = lights_.padded();
-  const bool two_sided = lights_.two_sided;
-  sums.front.resize(size), sums.back.resize(size);
-  const uint64_t* seen = visibility_.seen(index);
-  const float red = luminance(Rgb(1, 0, 0)), green = luminance(Rgb(0, 1, 0)), blue = luminance(Rgb(0, 0, 1));
+  const bool tinted = visibility_.coloured();
+  const Rgb weights(luminance(Rgb(1, 0, 0)), luminance(Rgb(0, 1, 0)), luminance(Rgb(0, 0, 1)));
   const auto brightness = [&](const std::vector<float>(&light)[3], std::vector<float>& out) {
-    for (uint32_t i = 0; i < size; i += kLanes) {
-      float share[kLanes];
-      spread_bits(seen[i / 64], i % 64, share);
-      const float *r = light[0].data() + i, *g = light[1].data() + i, *b = light[2].data() + i;
-      for (uint32_t l = 0; l < kLanes; ++l) out[i + l] = share[l] * (red * r[l] + green * g[l] + blue * b[l]);
+    out.assign(size, 0.0f);
+    for (int c = 0; c < 3; ++c) {
+      const float *shines = light[c].data(), *share = sums.seen[tinted ? c : 0].data();
+      for (uint32_t i = 0; i < size; ++i) out[i] += weights[c] * share[i] * shines[i];
     }
   };
   brightness(lights_.front, sums.front);
-  if (two_sided) brightness(lights_.back, sums.back);
-  if (!visibility_.coloured()) return;
-  for (uint32_t w = 0; w < visibility_.words(); ++w)
-    for (uint64_t bits = seen[w]; bits; bits &= bits - 1) {
-      const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
-      const Rgb passes = visibility_.get(index, k);
-      sums.front[k] = luminance(passes * lights_.lights[k].front);
-      if (two_sided) sums.back[k] = luminance(passes * lights_.lights[k].back);
-    }
+  if (lights_.two_sided) brightness(lights_.back, sums.back);
 }
 
 }  // namespace afterglow::instant_cache
