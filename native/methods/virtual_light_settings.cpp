@@ -8,7 +8,37 @@
 
 namespace afterglow {
 
+namespace {
+
+constexpr float kMostReaches = 4.0f;  // rooms, halls and gardens have balls of 1.5 to 3 reaches
+
+float middle(std::vector<float>& values, float share) {
+  const auto at = values.begin() + std::ptrdiff_t(share * float(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// Within which three of four lights stand around the middle of all.
+float reach_of(const std::vector<VirtualLight>& lights) {
+  std::vector<float> values;
+  Vec3 center(0.0f);
+  for (int axis = 0; axis < 3; ++axis) {
+    values.clear();
+    for (const VirtualLight& light : lights)
+      if (light.alive) values.push_back(light.position[axis]);
+    if (values.empty()) return 0.0f;
+    center[axis] = middle(values, 0.5f);
+  }
+  values.clear();
+  for (const VirtualLight& light : lights)
+    if (light.alive) values.push_back(glm::distance(light.position, center));
+  return middle(values, 0.75f);
+}
+
+}  // namespace
+
 void VirtualLightSettings::configure(const Settings& settings) {
+  *this = {};
   for (const auto& [name, value] : settings) {
     if (name == "virtual_lights") count = uint32_t(std::clamp<int64_t>(integer_of(value), 1, 1 << 20));
     if (name == "light_pattern") pattern = uint32_t(integer_of(value));
@@ -42,10 +72,13 @@ VirtualLightOptions VirtualLightSettings::options(const WalkLimits& limits, uint
           .threads = threads};
 }
 
-float VirtualLightSettings::bound_length(const Box& bounds) const {
+float VirtualLightSettings::bound_length(const Box& bounds, const std::vector<VirtualLight>& lights) const {
   Vec3 center;
   float radius;
   LightEmission::surrounding_ball(bounds, center, radius);
+  const float reach = kMostReaches * reach_of(lights);
+  // In steps, so that a light that moves a little moves no bound.
+  if (reach > 0.0f && reach < radius) radius = std::min(radius, std::exp2(std::ceil(4.0f * std::log2(reach)) * 0.25f));
   return bound * radius / std::sqrt(float(count));
 }
 

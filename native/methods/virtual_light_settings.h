@@ -17,8 +17,9 @@ struct VirtualLightSettings {
   static void describe(std::vector<SettingDescription>&);
   VirtualLightOptions options(const WalkLimits&, uint32_t threads) const;
   /// The bounding distance of (2): `bound` times the scene's radius over the square root of the number of lights, so
-  /// that more lights lose less light.
-  float bound_length(const Box& bounds) const;
+  /// that more lights lose less light. The radius is at most four times that of the lights: a wide ground or a thing
+  /// far away takes no light from a room.
+  float bound_length(const Box& bounds, const std::vector<VirtualLight>& lights) const;
 };
 
 }  // namespace afterglow

@@ -17,6 +17,7 @@ double number_of(const SettingValue& value) {
 }
 
 void WalkSettings::configure(const Settings& settings) {
+  *this = {};
   for (const auto& [name, value] : settings) {
     const auto limit = [&] { return uint32_t(std::max<int64_t>(0, integer_of(value))); };
     const auto clamp = [&] { return number_of(value) > 0.0 ? 3.0f * float(number_of(value)) : kInfinity; };

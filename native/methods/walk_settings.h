@@ -13,7 +13,7 @@ double number_of(const SettingValue&);
 struct WalkSettings {
   WalkLimits limits;
   float clamp_direct = kInfinity, clamp_indirect = kInfinity;  // on the sum of the channels
-  /// Takes what it knows and leaves the rest alone.
+  /// Takes what it knows; what is not named is as it is by default.
   void configure(const Settings&);
 };
 

@@ -73,15 +73,13 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   Vec3 center;
   float radius;
   LightEmission::surrounding_ball(scene.scene.bounds(), center, radius);
-  const float bound = settings_.lights.bound_length(scene.scene.bounds());
   const bool coloured = scene.effects.has(kTransparency) || !shown.empty();
   lazy_ = work.left = work.lazy && settings_.lights.short_rays;
   stale_ |= changes.everything || changes.origin || shown != shown_;
   // Another ball around the scene: all sums are made anew, and the lights whose paths begin on it move. Visibility
   // stays.
-  const bool other_bound = bound != bound_;
-  const bool scaled = center != center_ || radius != radius_ || bound != bound_;
-  shown_ = shown, center_ = center, radius_ = radius, bound_ = bound;
+  const bool scaled = center != center_ || radius != radius_;
+  shown_ = shown, center_ = center, radius_ = radius;
   look_back();
   update_++;
   const bool all = stale_;
@@ -114,8 +112,10 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   std::vector<uint64_t>& moved_slots = light_changes_.moved;
   bool recoloured = false;
   trace_lights(scene, work, moved_slots, recoloured);
-  recoloured |= scaled;
-  if (scaled)
+  const float bound = settings_.lights.bound_length(scene.scene.bounds(), lights_.lights);
+  const bool other_bound = std::exchange(bound_, bound) != bound;
+  recoloured |= scaled || other_bound;
+  if (scaled || other_bound)
     forget_sums();
   else if (light_changes_.any)
     forget_sums_of(light_changes_.other);

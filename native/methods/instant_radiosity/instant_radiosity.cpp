@@ -43,7 +43,7 @@ class InstantRadiosity final : public IndirectMethod {
     emission_.build(scene.scene, scene.materials);
     std::vector<VirtualLight> lights = trace_virtual_lights(
         walk(scene), emission_, lights_settings_.options(settings_.limits, work.threads), path_rays_);
-    bound_ = lights_settings_.bound_length(scene.scene.bounds());
+    bound_ = lights_settings_.bound_length(scene.scene.bounds(), lights);
     alive_ = 0;
     std::array<std::vector<VirtualLight>, kParts> parts;
     uint32_t next = 0;
