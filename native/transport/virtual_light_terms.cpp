@@ -115,8 +115,11 @@ LightSums sum_lights(const VirtualLightColumns& lights, const std::vector<float>
 }
 
 bool can_see(const Vec3& position, const Vec3& face_normal, const VirtualLight& light, bool front) {
+  // What lies in one plane sees nothing of it: which side of it rounding puts each on is chance, and the way between
+  // both sides of a flat wall would lead through it.
   const Vec3 way = light.position - position;
-  return glm::dot(way, face_normal) > 0.0f && (glm::dot(way, light.face_normal) < 0.0f) == front;
+  const float above = glm::dot(way, light.face_normal) * (front ? -1.0f : 1.0f);
+  return glm::dot(way, face_normal) > light.lift && above > light.lift;
 }
 
 Ray visibility_ray(const Vec3& from, const VirtualLight& light) {
