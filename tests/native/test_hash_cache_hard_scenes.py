@@ -31,13 +31,13 @@ def room(*things: Mesh) -> Description:
     return scene
 
 
-def needles() -> Description:
-    """Five hundred of a length of a metre and a width of a thousandth of a millimetre."""
+def needles(count: int = 500) -> Description:
+    """Of a length of a metre and a width of a thousandth of a millimetre."""
     rng = np.random.default_rng(1)
-    ends = rng.uniform(-0.9, 0.9, (500, 2, 3))
-    third = ends[:, :1] + 1e-6 * rng.normal(size=(500, 1, 3))
+    ends = rng.uniform(-0.9, 0.9, (count, 2, 3))
+    third = ends[:, :1] + 1e-6 * rng.normal(size=(count, 1, 3))
     corners = np.concatenate([ends, third], 1).reshape(-1, 3)
-    return room(Mesh(corners, np.arange(1500).reshape(-1, 3)))
+    return room(Mesh(corners, np.arange(3 * count).reshape(-1, 3)))
 
 
 def degenerate() -> Description:
