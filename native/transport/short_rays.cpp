@@ -82,12 +82,15 @@ void ShortRays::walk(const ShortRayPlace& place, uint32_t index, std::vector<Sto
     for (int i = 0; i < diffuse.count; ++i)
       albedo[diffuse.lobes[i].kind == LobeKind::kTranslucent] += diffuse.lobes[i].weight;
     const float weight[2] = {sum_of(albedo[0]), sum_of(albedo[1])};
-    if (!(weight[0] + weight[1] > 0.0f) || is_black(throughput)) return;
     Stop stop;
     stop.position = point.position, stop.error = point.error;
     stop.normal = pack_direction(point.normal), stop.face_normal = pack_direction(point.face_normal);
-    for (int side : {0, 1}) stop.weight[side] = pack_color(throughput * albedo[side]);
     stop.walk = uint16_t(index), stop.depth = uint8_t(depth);
+    if (!(weight[0] + weight[1] > 0.0f) || is_black(throughput)) {
+      stops.push_back(stop);  // brings nothing, but when it leaves, what is behind it may
+      return;
+    }
+    for (int side : {0, 1}) stop.weight[side] = pack_color(throughput * albedo[side]);
     stop.choice = uint16_t(sampler_at(place, index, depth, kGroupChoice).next1() * 65536.0f);
     stop.flags = Stop::kLampStale;
     const bool back = u_side * (weight[0] + weight[1]) >= weight[0];
@@ -110,6 +113,10 @@ void ShortRays::walk(const ShortRayPlace& place, uint32_t index, std::vector<Sto
 }
 
 void ShortRays::find_light(const ShortRayPlace& place, Stop& stop, RayCounts& counts) const {
+  if (!stop.weight[0] && !stop.weight[1]) {
+    stop.flags &= uint8_t(~(Stop::kStale | Stop::kLampStale));
+    return;
+  }
   if (stop.flags & Stop::kLampStale) {
     Sampler sampler = sampler_at(place, stop.walk, stop.depth, kLamp);
     const Vec2 u = sampler.next2();
