@@ -388,7 +388,7 @@ void Cache::mark_nearby(const CommittedScene& scene, Work& work) {
 void Cache::look_back() {
   const size_t asked = size_t(std::count(used_.begin(), used_.end(), update_));
   interrupted_ = 2 * asked >= asked_whole_ ? 0 : interrupted_ + 1;
-  asked_whole_ = std::max(asked, asked_whole_ - asked_whole_ / 16);
+  asked_whole_ = std::max(asked, asked_whole_ - (asked_whole_ + 15) / 16);  // down to none, of who looks at the sky
 }
 
 void Cache::age() {
