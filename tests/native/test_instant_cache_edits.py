@@ -94,8 +94,9 @@ def edit_lights_and_looks(live: Live, rng: np.random.Generator, state: dict[str,
         copies = state.pop("copies", None)
         if copies is not None:
             scene.remove_instances(copies)
-        places = [translate(rng.uniform((-0.8, -0.8, 0.1), (0.8, 0.8, 1.8))) @ scale((0.2,) * 3) for _ in range(rng.integers(1, 9))]
-        state["copies"] = scene.add_instances(built.meshes["Ball"], np.array(places), name="Copies",
+        places = rng.uniform((-0.8, -0.8, 0.1), (0.8, 0.8, 1.8), (rng.integers(1, 9), 3))
+        transforms = np.array([translate(place) @ scale((0.2,) * 3) for place in places])
+        state["copies"] = scene.add_instances(built.meshes["Ball"], transforms, name="Copies",
                                               materials=[built.materials["green"]])
     else:
         live.move("Panel", translate(rng.uniform((-0.3, -0.3, -0.3), (0.3, 0.3, 0.3))))

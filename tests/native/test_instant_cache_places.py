@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from afterglow.scenes import look_at, scale, translate
+from afterglow.scenes import look_at, rotate, scale, translate
+from afterglow.scenes.shapes import sphere
 from test_instant_cache import Live, room
 
 # As native/methods/instant_cache/files.cpp writes them.
@@ -173,3 +174,37 @@ def test_records_that_nobody_looks_at_are_forgotten(away: str) -> None:
     assert live.numbers()["records"] < 0.7 * made and left < 100
     seen = live.numbers()["records"]
     assert dropped(200) == dropped(201) and live.numbers()["records"] == seen
+
+
+@pytest.mark.parametrize("length", [1 - 1e-6, 1 + 1e-6, 1 + 1e-5])
+def test_normals_that_are_rounded_longer_than_one(tmp_path: Path, length: float) -> None:
+    """Their cosine with a point's may be above 1, and the root of what is missing to 1 no number."""
+    def scaled(factor: float) -> np.ndarray:
+        def records(saved: Saved, first: Live) -> np.ndarray:
+            made = saved.records.copy()
+            made["normal"] *= np.float32(factor)
+            return made
+
+        live = loaded(records, tmp_path / "cache", width=32, height=32, cache_verify=False)
+        assert live.numbers()["records_new"] <= 0.1 * live.numbers()["records"]  # those that were loaded answer
+        return live.image()
+
+    assert np.abs(scaled(length) - scaled(1.0)).max() < 1e-3
+
+
+def test_two_moving_objects_overlap() -> None:
+    """They go through each other, together and one after the other; what one leaves the other still hides."""
+    description = room()
+    description.add("Other", sphere(0.25, 16, 8), "ball", transform=translate((0.3, -0.3, 0.9)))
+    live = Live(description, width=24, height=24)
+
+    def place(name: str, x: float) -> None:
+        live.move(name, translate((x, -0.3, 0.9)) @ rotate(x))
+
+    for a, b in ((0.3, 0.35), (0.35, 0.3), (0.35, 0.1), (0.1, 0.1), (0.9, 0.1), (0.1, 0.9)):
+        def both(a: float = a, b: float = b) -> None:
+            place("Ball", a)
+            place("Other", b)
+
+        numbers = live.edit(both)
+        assert numbers["objects_moved"] >= 1 and numbers["verified_worst"] <= 1e-5 and numbers["verified_records"] > 20

@@ -9,7 +9,8 @@ from typing import Any
 import afterglow
 import numpy as np
 import pytest
-from afterglow.scenes import Camera, Description, Light, look_at, node, translate
+from afterglow.scenes import SCENES, Camera, Description, Light, look_at, node, translate
+from afterglow.scenes.native import Built
 from afterglow.scenes.rooms import background, cornell_box, diffuse, furnace, sealed_box
 from afterglow.scenes.shapes import box, quad
 from hard_cases import Mean, agree, render
@@ -185,3 +186,49 @@ def test_two_sided_translucent_surfaces() -> None:
     truth = indirect(scene, 4, method="PATH_TRACING", samples=256)
     found = indirect(scene, 6, samples=8, virtual_lights=2000, **EXACT)
     agree(found, truth, tolerance=0.02)
+
+
+def test_neighbours_share_no_light_across_edges() -> None:
+    """A table of whose top nothing is seen by anything, above a lit floor and its wall: not a pixel of the top has light of them."""
+    scene = Description("table", Camera(look_at((0, -1.5, 4), (0, 0, 0.5)), math.radians(35)))
+    scene.materials["white"] = diffuse((0.8, 0.8, 0.8))
+    scene.add("Floor", quad((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)), "white")
+    scene.add("Wall", quad((-2, 1.5, 0), (2, 1.5, 0), (2, 1.5, 0.9), (-2, 1.5, 0.9)), "white")
+    scene.add("Table", box((-0.5, -0.5, 0.8), (0.5, 0.5, 1.0)), "white")
+    scene.objects[-1].pass_index = 3
+    scene.lights = [Light("L", "point", translate((0.9, 0.8, 0.6)), 50.0)]
+    settings: dict[str, Any] = dict(size=48, samples=1, virtual_lights=256, pixel_filter="GAUSSIAN", filter_width=0.01,
+                                    passes=["diffuse_indirect", "object_index", "normal"], method="INSTANT_RADIOSITY")
+    shared, whole = (render(scene, interleave=interleave, **settings).passes for interleave in (True, False))
+    table = shared["object_index"][..., 0] == 3
+    top = table & (shared["normal"][..., 2] > 0.9)
+    floor = ~table & (shared["normal"][..., 2] > 0.9)
+    assert top.sum() > 100 and whole["diffuse_indirect"][top].max() == 0.0
+    assert shared["diffuse_indirect"][top].max() == 0.0
+    ratio = shared["diffuse_indirect"][floor].sum(-1) / whole["diffuse_indirect"][floor].sum(-1)
+    beside = np.zeros_like(table)
+    beside[1:-1, 1:-1] = table[2:, 1:-1] | table[:-2, 1:-1] | table[1:-1, 2:] | table[1:-1, :-2]
+    assert np.median(ratio) == pytest.approx(1, abs=0.1)
+    edge = shared["diffuse_indirect"][floor & beside].sum() / whole["diffuse_indirect"][floor & beside].sum()
+    assert edge == pytest.approx(1, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["cornell_textured", "cornell_glossy", "textured_room", "principled"])
+def test_textured_and_glossy_surfaces_send_the_light_of_their_diffuse_part(name: str) -> None:
+    """Pictures, checkers, coats and gloss: what leaves their diffuse lobes is what paths find there."""
+    scene = SCENES["cornell_box" if name == "principled" else name]()
+    if name == "principled":
+        scene.materials["white"] = node("principled", base_color=(0.7, 0.7, 0.7), roughness=0.3, coat_weight=0.5, metallic=0.2)
+    built = Built(scene)
+    settings: dict[str, Any] = dict(size=16, caustics_reflective=False, caustics_refractive=False, diffuse_bounces=3,
+                                    passes=["diffuse_indirect", "diffuse_color"])
+
+    def mean(repeats: int, **more: Any) -> Mean:
+        passes = [render(built, seed=i, light_pattern=i, **settings, **more).passes for i in range(repeats)]
+        values = [float((p["diffuse_indirect"] * p["diffuse_color"]).mean(dtype=np.float64)) for p in passes]
+        return Mean(float(np.mean(values)), float(np.std(values, ddof=1) / repeats**0.5))
+
+    truth = mean(4, method="PATH_TRACING", samples=64)
+    found = mean(12, samples=1, virtual_lights=600, **EXACT)
+    agree(found, truth, tolerance=0.01)
+    assert found.error < 0.05 * found.value
