@@ -14,6 +14,7 @@ from afterglow.scenes.rooms import background, diffuse, emission
 from afterglow.scenes.shapes import quad, sphere
 
 SIZE = 24
+METHOD = "PATH_TRACING"  # of renders that name none
 
 
 class Mean(NamedTuple):
@@ -25,8 +26,8 @@ class Mean(NamedTuple):
 
 def render(scene: Any, size: int = SIZE, samples: int = 32, **settings: Any) -> afterglow.Result:
     """A small render that must be finite and not negative, whatever the scene."""
-    defaults = dict(width=size, height=size, samples=samples, max_bounces=12, diffuse_bounces=12, glossy_bounces=12,
-                    transmission_bounces=12, caustics_reflective=True, caustics_refractive=True)
+    defaults = dict(method=METHOD, width=size, height=size, samples=samples, max_bounces=12, diffuse_bounces=12,
+                    glossy_bounces=12, transmission_bounces=12, caustics_reflective=True, caustics_refractive=True)
     result = afterglow.render(scene, **{**defaults, **settings})
     for name, pixels in result.passes.items():
         assert np.isfinite(pixels).all(), f"pass {name} holds values that are not finite"
