@@ -174,6 +174,9 @@ def test_settings_are_described() -> None:
     described = {m["id"]: m for m in afterglow.method_descriptions()}
     names = {s["name"] for s in described["INSTANT_RADIOSITY"]["settings"]}
     assert {"virtual_lights", "light_bound", "light_pattern", "interleave"} <= names
+    for method in ("INSTANT_RADIOSITY", "INSTANT_CACHE"):  # what they cannot show is named where they are chosen
+        assert all(word in described[method]["description"] for word in ("caustics", "corners", "short rays"))
+    assert "partitions" in described["INSTANT_CACHE"]["description"] and "even within" in described["HASH_CACHE"]["description"]
 
 
 def test_two_sided_translucent_surfaces() -> None:
@@ -189,7 +192,7 @@ def test_two_sided_translucent_surfaces() -> None:
 
 
 def test_neighbours_share_no_light_across_edges() -> None:
-    """A table of whose top nothing is seen by anything, above a lit floor and its wall: not a pixel of the top has light of them."""
+    """A table whose top sees nothing, above a lit floor and its wall: not a pixel of the top has light of them."""
     scene = Description("table", Camera(look_at((0, -1.5, 4), (0, 0, 0.5)), math.radians(35)))
     scene.materials["white"] = diffuse((0.8, 0.8, 0.8))
     scene.add("Floor", quad((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)), "white")

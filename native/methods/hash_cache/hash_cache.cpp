@@ -124,7 +124,9 @@ MethodDescription describe() {
   MethodDescription d;
   d.id = "HASH_CACHE";
   d.label = "HashCache";
-  d.description = "Bounced light kept in a hierarchy of small cells: what one frame found, all that follow see";
+  d.description =
+      "Bounced light kept in a hierarchy of small cells: what one frame found, all that follow see. Bounced light is "
+      "even within a cell: creases are softer, and some light passes beneath walls thinner than a cell";
   const auto add = [&](const char* name, const char* label, const char* text, const char* unit, SettingValue value,
                        double min, double max) {
     d.settings.push_back({name, label, text, unit, value, min, max});

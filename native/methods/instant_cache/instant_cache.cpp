@@ -112,7 +112,10 @@ MethodDescription describe() {
   MethodDescription d;
   d.id = "INSTANT_CACHE";
   d.label = "Instant Cache";
-  d.description = "Bounced light from virtual point lights, remembered at sparse places and repaired after every edit";
+  d.description =
+      "Bounced light from virtual point lights, remembered at sparse places and repaired after every edit. No caustics "
+      "on diffuse surfaces that are seen directly; corners are too dark without short rays; some light passes beneath "
+      "thin partitions";
   VirtualLightSettings::describe(d.settings);
   d.settings.push_back(
       {"cache_accuracy", "Interpolation",

@@ -136,7 +136,9 @@ MethodDescription describe() {
   MethodDescription d;
   d.id = "INSTANT_RADIOSITY";
   d.label = "Instant Radiosity";
-  d.description = "Virtual point lights asked by every pixel anew: no noise, but nothing is remembered";
+  d.description =
+      "Virtual point lights asked by every pixel anew: no noise, but nothing is remembered. No caustics on diffuse "
+      "surfaces that are seen directly; corners are too dark without short rays";
   VirtualLightSettings::describe(d.settings);
   d.settings.push_back({"interleave", "Interleave",
                         "Neighbouring pixels ask different parts of the lights and share what they find", "", true, 0.0,
