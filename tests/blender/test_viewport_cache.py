@@ -83,3 +83,84 @@ def test_frames_of_an_animation_share_a_cache(in_blender: Run, blend_files: Path
     assert found["resets"] == [1, 1, 1]
     assert found["moved"][1:] == [1, 1]
     assert found["kept"] == 0
+
+
+def test_caches_are_saved_loaded_forgotten_and_shown(in_window: Run, blend_files: Path, tmp_path: Path) -> None:
+    """The buttons of the panel, for both methods that remember; without a viewport that renders they are greyed out."""
+    found = in_window(
+        f"""
+        s = scene()
+        s.afterglow.preview_accuracy, s.afterglow.preview_samples = 0.0, 2
+        s.render.preview_pixel_size = '4'
+        seen = {{}}
+        panel = addon('ui.render')
+
+        def values():
+            return viewport().session.statistics()['values']
+
+        def steps():
+            ops = bpy.ops.afterglow
+            seen['asleep'] = [op.poll() for op in (ops.cache_save, ops.cache_load, ops.cache_forget)]
+            space = full_view(); yield 1.0
+            for method, held, resets in (('INSTANT_CACHE', 'records', 'resets'), ('HASH_CACHE', 'cells', 'cache_resets')):
+                s.afterglow.method = method; yield 0.3
+                yield from settled()
+                path, it = {str(tmp_path)!r} + '/' + method, {{}}
+                first, before = view_picture().copy(), values()
+                it['held'] = before[held]
+                it['save'] = list(ops.cache_save(filepath=path))
+                it['forget'] = list(ops.cache_forget()); yield 0.1
+                it['load'] = list(ops.cache_load(filepath=path)); yield 0.1
+                yield from settled()
+                it['resets'], it['loaded'] = values()[resets], values()[held]
+                it['same'] = np.abs(view_picture() - first).mean()
+                try:
+                    ops.cache_load(filepath=path + ' that is not there')
+                    it['error'] = ''
+                except RuntimeError as error:
+                    it['error'] = str(error)
+                group, name = panel.view_setting(s)
+                choices = addon('backend').method_descriptions()
+                views = next(m for m in choices if m['id'] == method)['debug_views']
+                setattr(group, name, views[0]); yield 0.1
+                yield from settled()
+                it['shown'] = np.abs(view_picture() - first).mean()
+                seen[method] = it
+            result(**seen)
+        drive(steps)
+        """,
+        blend_files / "cornell_box.blend",
+    )
+    assert "Traceback" not in found["output"], found["output"][-3000:]
+    assert found["asleep"] == [False, False, False]
+    for method in ("INSTANT_CACHE", "HASH_CACHE"):
+        it = found[method]
+        assert it["save"] == it["load"] == it["forget"] == ["FINISHED"] and it["held"] > 10, it
+        assert (tmp_path / method).stat().st_size > 1000 and it["error"]
+        assert it["loaded"] >= 0.9 * it["held"] and it["resets"] == 0 and it["same"] < 0.02, it
+        assert it["shown"] > 0.05, it
+
+
+def test_frames_of_an_animation_share_cells(in_blender: Run, blend_files: Path) -> None:
+    """HashCache: the second frame begins with the cells of the first, and an object that moves throws none but its own away."""
+    found = in_blender(
+        """
+        import os
+        s = scene(64, 48, samples=1, method='HASH_CACHE')
+        box = s.objects['Tall']
+        for frame in (1, 2, 3):
+            box.location.x += 0.1
+            box.keyframe_insert('location', frame=frame)
+        s.frame_start, s.frame_end = 1, 3
+        s.render.filepath = os.path.join(os.path.dirname(os.environ['AFTERGLOW_RESULT']), 'frame_')
+        seen = []
+        store = addon('store')
+        bpy.app.handlers.render_post.append(lambda *_: seen.append(store.statistics(s)['values']))
+        bpy.ops.render.render(animation=True)
+        result(resets=[v['cache_resets'] for v in seen], cells=[v['cells'] for v in seen], kept=len(store._kept))
+        """,
+        blend_files / "cornell_box.blend",
+    )
+    assert found["resets"] == [1, 1, 1]
+    assert found["cells"][0] > 100 and found["cells"][1] > 0.8 * found["cells"][0]
+    assert found["kept"] == 0
