@@ -287,6 +287,13 @@ void bind_session(py::module_& m) {
       .def("statistics", &statistics);
   m.def("method_descriptions", &descriptions);
   m.def("caching_share", &caching_share, py::arg("view_moved"), py::arg("step"));
+  m.def(
+      "denoise_plan",
+      [](bool viewport, double samples, uint32_t kept) {
+        const DenoisePlan plan = denoise_plan(viewport, samples, kept);
+        return py::make_tuple(plan.prefilter, plan.fast);
+      },
+      py::arg("viewport"), py::arg("samples"), py::arg("kept"));
   m.def("record_rays", &record, py::arg("scene"), py::arg("settings") = py::dict(), py::arg("most") = size_t(500'000));
   bind_denoise(m);
 }

@@ -35,6 +35,11 @@ uint32_t coarsest_step(uint64_t pixels, double sample_seconds) {
   return step;
 }
 
+DenoisePlan denoise_plan(bool viewport, double samples, uint32_t kept) {
+  const bool clean = kept >= kPrefilterTo;
+  return {.prefilter = !viewport && !clean && samples >= kPrefilterFrom, .fast = viewport || clean};
+}
+
 std::vector<PixelRequest> pass_requests(const PassPlan& plan, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1) {
   // About a thousand samples a request: small enough to share out evenly, large enough to forget the sharing.
   uint32_t side = 16;
@@ -59,6 +64,14 @@ uint32_t least_samples(const Film& film) {
   uint32_t least = ~0u;
   for (size_t p = 0, n = size_t(film.width()) * film.height(); p < n; ++p) least = std::min(least, film.samples(p));
   return least;
+}
+
+uint32_t typical_samples(const Film& film) {
+  std::vector<uint32_t> counts(size_t(film.width()) * film.height());
+  for (size_t p = 0; p < counts.size(); ++p) counts[p] = film.samples(p);
+  const auto middle = counts.begin() + ptrdiff_t(counts.size() / 2);
+  std::nth_element(counts.begin(), middle, counts.end());
+  return middle == counts.end() ? 0 : *middle;
 }
 
 std::vector<PixelRequest> catch_up_requests(Film& film, uint32_t enough) {

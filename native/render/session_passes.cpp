@@ -17,9 +17,6 @@ namespace {
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-/// Prefiltered guides take a tenth to an eighth off the denoised error (Country Kitchen, 4 and 16 samples), as half as
-/// many samples again would, for what one or two samples cost.
-constexpr double kPrefilterFrom = 4.0;
 /// Pictures of a cache are smooth but for direct light: their first one may take three times as long and be finer.
 constexpr double kFinerStart = 1.0 / 3.0;
 
@@ -234,8 +231,9 @@ bool Session::filter(const RenderSettings& settings, const Film& film, Image& im
   }
   for (size_t p = 0; p < pixels; ++p)
     for (size_t c = 0; c < 3; ++c) images->color[p * 3 + c] = image.rgba[p * 4 + c];
-  images->fast = settings.viewport;
-  images->prefilter = !settings.viewport && samples >= kPrefilterFrom;
+  const uint32_t kept = film.carries() && !settings.viewport ? typical_samples(film) : 0;
+  const DenoisePlan plan = denoise_plan(settings.viewport, samples, kept);
+  images->fast = plan.fast, images->prefilter = plan.prefilter;
   try {
     if (denoiser_made_for_ != settings.denoiser) denoiser_.reset();
     denoiser_made_for_ = settings.denoiser;

@@ -113,11 +113,12 @@ def test_a_click_prepares_an_animation(in_blender: Run) -> None:
         bpy.ops.afterglow.quality(quality='CAMERA')
         result(camera=[own.method, own.samples, own.hash_cache.hash_extra, s.render.use_persistent_data, own.max_bounces])
         bpy.ops.afterglow.quality(quality='OBJECTS')
-        result(objects=[own.method, own.accuracy, own.instant_cache.virtual_lights, own.instant_cache.light_compensation])
+        cache = own.instant_cache
+        result(objects=[own.method, own.accuracy, cache.virtual_lights, cache.light_compensation, cache.cache_first])
         """
     )
     assert found["camera"] == ["HASH_CACHE", 1, 3.0, True, 7]
-    assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 48]
+    assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 48, 16]
 
 
 def test_an_active_virtual_environment_is_no_obstacle(in_blender: Run, tmp_path: Path) -> None:

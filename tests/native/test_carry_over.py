@@ -213,3 +213,22 @@ def test_frames_of_an_animation_keep_what_stands_still() -> None:
     still, _, rays = frame(THERE, 4)
     assert distance(still, picture) < 0.02, "a frame in which nothing moves is another picture"
     assert rays < 0.1 * first_rays
+
+
+def test_the_first_frame_takes_samples_for_those_that_follow() -> None:
+    """Once: where nothing changes they stay, and what changes gets no more than any frame's."""
+    built = Built(room())
+
+    def counts(place: tuple[float, float, float], **more: Any) -> np.ndarray:
+        built.scene.set_transforms(built.instances["Ball"], np.asarray(translate(place), np.float64)[None])
+        built.scene.commit()
+        settings = {**SETTINGS, "viewport": False, "samples": 3, "cache_first": 20, "passes": ["combined", "sample_count"], **more}
+        session = afterglow.Session(built.scene, settings)
+        session.start()
+        session.wait()
+        return np.squeeze(session.read("sample_count"))
+
+    assert counts(HERE).min() == 20
+    moved = counts(THERE)
+    assert moved.min() == 3 and np.median(moved) == 20
+    assert counts(HERE, carry_over=False).max() == 3, "the cache was not empty"

@@ -14,7 +14,7 @@ from pathlib import Path
 import afterglow
 import numpy as np
 import pytest
-from afterglow import metrics, scenes
+from afterglow import _native, metrics, scenes
 from afterglow.scenes.native import Built
 from hard_cases import ball_under_sky
 
@@ -129,6 +129,15 @@ def session(built: Built, copies: list[str], width: int, height: int, **settings
     built.scene.commit()
     return afterglow.Session(built.scene, {"width": width, "height": height, "denoise": True, "denoiser_search": copies,
                                            **settings})
+
+
+def test_guides_are_filtered_until_kept_samples_make_them_clean() -> None:
+    """(prefilter, small network)"""
+    for samples in (1, 3, 4, 64):
+        assert _native.denoise_plan(True, samples, 0) == (False, True)
+        assert _native.denoise_plan(False, samples, 0) == (samples >= 4, False)
+    assert _native.denoise_plan(False, 4, 11) == (True, False)
+    assert _native.denoise_plan(False, 4, 12) == (False, True)
 
 
 def test_a_render_is_denoised(copies: list[str], truth: np.ndarray) -> None:

@@ -21,7 +21,7 @@ QUALITIES = {
     ),
     "OBJECTS": dict(
         method="INSTANT_CACHE", accuracy=0.0, samples=7, denoise=True, use_animated_seed=True,
-        instant_cache=dict(virtual_lights=512, light_compensation=48, light_bound=4.0),
+        instant_cache=dict(virtual_lights=512, light_compensation=48, light_bound=4.0, cache_first=16),
     ),
 }
 ANIMATIONS = {"CAMERA", "OBJECTS"}  # they want persistent data

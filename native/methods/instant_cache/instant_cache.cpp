@@ -23,7 +23,7 @@ View view_of(const SettingValue& value) {
 
 class InstantCache final : public IndirectMethod {
  public:
-  MethodTraits traits() const override { return {.steady = true, .fills_holes = true}; }
+  MethodTraits traits() const override { return {.steady = true, .fills_holes = true, .first = cold_ ? first_ : 0u}; }
 
   void configure(const Settings& settings) override {
     CacheSettings s;
@@ -31,11 +31,13 @@ class InstantCache final : public IndirectMethod {
     s.lights.configure(settings);
     verify_ = false;
     view_ = View::kLight;
+    first_ = 0;
     float from_render = 0.0f;
     s.accuracy = 0.0f;
     for (const auto& [name, value] : settings) {
       if (name == "accuracy") from_render = float(number_of(value));
       if (name == "cache_accuracy") s.accuracy = float(number_of(value));
+      if (name == "cache_first") first_ = uint32_t(integer_of(value));
       if (name == "cache_keep") s.keep_updates = uint32_t(integer_of(value));
       if (name == "cache_on_demand") s.on_demand = integer_of(value) != 0;
       if (name == "cache_verify") verify_ = integer_of(value) != 0;
@@ -46,6 +48,7 @@ class InstantCache final : public IndirectMethod {
   }
 
   void update(const CommittedScene& scene, const SceneChanges& changes, Work& work) override {
+    cold_ = cache_.size() == 0;
     cache_.update(scene, changes, work);
     if (verify_) verification_ = cache_.verify(scene, work);
   }
@@ -101,7 +104,8 @@ class InstantCache final : public IndirectMethod {
 
  private:
   Cache cache_;
-  bool verify_ = false;
+  bool verify_ = false, cold_ = true;
+  uint32_t first_ = 0;
   View view_ = View::kLight;
   Verification verification_;
 };
@@ -121,6 +125,10 @@ MethodDescription describe() {
       {"cache_accuracy", "Interpolation",
        "Relative error of interpolated light that is accepted: smaller, more records; 0: the render's own accuracy", "",
        0.0, 0.0, 1.0});
+  d.settings.push_back({"cache_first", "First Samples",
+                        "Samples that the first picture of an empty cache takes at least: where nothing changes they "
+                        "stay for all frames that follow, if samples are kept",
+                        "", int64_t(0), 0.0, 65536.0});
   d.settings.push_back({"cache_keep", "Keep Unused",
                         "Updates after which a record that no pixel used is forgotten; 0: never", "", int64_t(64), 0.0,
                         1e6});
