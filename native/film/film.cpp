@@ -311,7 +311,10 @@ void Film::guide(uint32_t x, uint32_t y, const LayerPixel& surface) {
   carry_->guide(size_t(y - settings_.y0) * width() + (x - settings_.x0), surface);
 }
 
+/// Without deviations pictures show what stands in the film.
 void Film::smooth(const std::vector<float>& deviations, unsigned threads, StopToken stop) {
+  for (size_t p = 0; p < counts_.size() && deviations.empty(); ++p) carry_->take_nothing(p);
+  if (deviations.empty()) return;
   const auto mean = [&](size_t pixel, Pass pass) {
     const float* from = sums_.data() + pixel * size_t(layout_.floats) + size_t(layout_[pass]);
     return Rgb(from[0], from[1], from[2]) / float(counts_[pixel]);

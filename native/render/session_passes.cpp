@@ -108,6 +108,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
   bool shown_filtered = false;
   const bool carries = film.carries();
   const bool goes_on = carries && !settings.viewport && least_samples(film) > 0;  // from the frame before
+  if (carries && !settings.viewport) film.smooth({}, settings.threads, work.stop);
   if (carries) film.begin_asking();
   uint32_t caught_up = 0;
   uint32_t done = before;
@@ -192,9 +193,9 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     if (settings.accuracy > 0.0f && error_may_stop(done) && noise.value >= 0.0f && noise.value <= settings.accuracy)
       break;
   }
-  if (!stop_ && carries && !settings.viewport)
-    film.smooth(relative_deviations(noise_of(film), film.width(), film.height()), settings.threads, work.stop);
   if (!stop_ && settings.denoise && done && !settings.viewport) publish(settings, film, 1, true);
+  if (!stop_ && carries && !settings.viewport && !this->shown())  // noise that is smoothed denoises worse
+    film.smooth(relative_deviations(noise_of(film), film.width(), film.height()), settings.threads, work.stop);
   if (!stop_ && settings.viewport && !shown_filtered && done) publish(settings, film, 1, false);
   return done;
 }

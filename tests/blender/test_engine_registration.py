@@ -118,7 +118,7 @@ def test_a_click_prepares_an_animation(in_blender: Run) -> None:
         """
     )
     assert found["camera"] == ["HASH_CACHE", 1, 3.0, True, 7]
-    assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 48, 16]
+    assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 32, 16]
 
 
 def test_an_active_virtual_environment_is_no_obstacle(in_blender: Run, tmp_path: Path) -> None:

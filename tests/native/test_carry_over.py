@@ -232,3 +232,17 @@ def test_the_first_frame_takes_samples_for_those_that_follow() -> None:
     moved = counts(THERE)
     assert moved.min() == 3 and np.median(moved) == 20
     assert counts(HERE, carry_over=False).max() == 3, "the cache was not empty"
+
+
+def test_a_frame_that_cannot_be_denoised_is_smoothed() -> None:
+    """What is denoised is not: the denoiser does better with noise as it is."""
+    pictures = []
+    for denoise in (False, True):
+        built = Built(room())
+        session = afterglow.Session(built.scene, {**SETTINGS, "viewport": False, "samples": 3, "denoise": denoise})
+        session.start()
+        session.wait()
+        if session.statistics()["denoiser"]:
+            pytest.skip("a copy of OpenImageDenoise is there")
+        pictures.append(session.read("combined"))
+    np.testing.assert_allclose(*pictures, rtol=1e-4)

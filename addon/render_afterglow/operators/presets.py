@@ -20,8 +20,8 @@ QUALITIES = {
         hash_cache=dict(hash_extra=3.0, hash_resolution=0.5, hash_first=4),
     ),
     "OBJECTS": dict(
-        method="INSTANT_CACHE", accuracy=0.0, samples=7, denoise=True, use_animated_seed=True,
-        instant_cache=dict(virtual_lights=512, light_compensation=48, light_bound=4.0, cache_first=16),
+        method="INSTANT_CACHE", accuracy=0.0, samples=4, denoise=True, use_animated_seed=True,
+        instant_cache=dict(virtual_lights=512, light_compensation=32, light_bound=4.0, cache_first=16),
     ),
 }
 ANIMATIONS = {"CAMERA", "OBJECTS"}  # they want persistent data
