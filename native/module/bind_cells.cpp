@@ -56,15 +56,16 @@ py::dict occupied_cells(const PyScene& self, int levels, const py::handle& point
         for (int c = 0; c < 3; ++c) *shown++ = value[c];
       }
   }
-  py::list cells, blocks, map_bytes, data_bytes;
+  py::list cells, blocks, maps, map_bytes, data_bytes;
   for (const hash_cache::OccupiedLevel& level : occupied.levels()) {
     cells.append(level.cells());
     blocks.append(level.blocks());
+    maps.append(level.maps());
     map_bytes.append(level.map_bytes());
     data_bytes.append(level.data_bytes());
   }
   py::dict out;
-  out["cells"] = cells, out["blocks"] = blocks, out["map_bytes"] = map_bytes, out["data_bytes"] = data_bytes;
+  out["cells"] = cells, out["blocks"] = blocks, out["maps"] = maps, out["map_bytes"] = map_bytes, out["data_bytes"] = data_bytes;
   out["index"] = index, out["light"] = kept;
   out["peak_bytes"] = occupied.peak_bytes();
   out["seconds_mark"] = occupied.seconds_mark(), out["seconds_maps"] = occupied.seconds_maps();

@@ -89,6 +89,35 @@ def test_coarser_levels_are_the_finer_ones_halved() -> None:
     assert found["cells"][0] == 1
 
 
+def test_space_is_split_among_maps_where_keys_end() -> None:
+    """8192³: eight maps. Around each triangle the cells are those that the triangle–box test finds, in every map."""
+    level, rng = 13, np.random.default_rng(8)
+    n = 1 << level
+    triangles = rng.uniform(-1, 1, (40, 1, 3)) + 0.002 * rng.normal(size=(40, 3, 3))
+    triangles[:, :, 2] += np.linspace(-0.9, 0.9, 40)[:, None] - triangles[:, :1, 2]
+    built = soup(triangles)
+    low, high = (np.asarray(v, np.float64) for v in built.scene.bounds)
+    edge = float((high - low).max()) * 1.0001
+    corner, cell = (low + high) / 2 - edge / 2, edge / n
+    asked = []
+    for t in triangles.astype(np.float32).astype(np.float64):
+        inside = (t - corner) / cell
+        first, last = np.floor(inside.min(0)).astype(int) - 2, np.floor(inside.max(0)).astype(int) + 2
+        cells = np.stack(np.meshgrid(*[np.arange(a, b + 1) for a, b in zip(first, last, strict=True)], indexing="ij"), -1)
+        cells = cells.reshape(-1, 3)
+        asked.append((inside, cells[((cells >= 0) & (cells < n)).all(1)]))
+    every = np.concatenate([cells for _, cells in asked])
+    found = _native.occupied_cells(built.scene, level, corner + (every + 0.5) * cell)
+    marked, at = found["index"][level] >= 0, 0
+    for inside, cells in asked:
+        own = marked[at:at + len(cells)]
+        at += len(cells)
+        least, most = (touches(inside, cells.astype(float), grown) for grown in (-0.01, 0.02))
+        assert least.sum() > 3 and not (least & ~own).any() and not (own & ~most).any()
+    assert found["maps"] == [1] * 13 + [8] and set((every[marked, 2] // 1024).tolist()) == set(range(8))
+    assert len(np.unique(found["index"][level][marked])) == found["cells"][level], "nothing else is marked"
+
+
 def test_every_surface_that_a_ray_meets_lies_in_a_marked_cell() -> None:
     built = Built(cornell_box("glossy"))
     built.scene.commit()
@@ -110,7 +139,7 @@ def test_nothing_and_wrong_input() -> None:
     scene.commit()
     assert _native.occupied_cells(scene, 3, np.zeros((0, 3)))["cells"] == [0, 0, 0, 0]
     with pytest.raises(afterglow.InvalidInput):
-        _native.occupied_cells(scene, 13, np.zeros((0, 3)))
+        _native.occupied_cells(scene, 15, np.zeros((0, 3)))
 
 
 @pytest.mark.parametrize("usage", [0.25, 0.9, 1.1])

@@ -8,13 +8,20 @@
 #include <chrono>
 #include <new>
 
+#include "base/errors.h"
 #include "base/parallel.h"
 
 namespace afterglow::hash_cache {
 
 namespace {
 
-constexpr float kSlack = 1.0f / 512.0f;  // cells: more than single precision loses at 4096
+/// In cells: more than single precision loses.
+float slack_at(int resolution) { return std::max(1.0f, float(resolution) / 4096.0f) / 512.0f; }
+
+constexpr int kKeyBits = 31;  // of a map's keys: a level of 4096³ fills them, and none is the mark of an empty slot
+
+/// Layers of blocks that one map takes, as a power of two.
+uint32_t layers_shift(int level) { return level < 2 ? 0u : uint32_t(std::clamp(kKeyBits - 2 * (level - 2), 0, 30)); }
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -57,7 +64,7 @@ class Layer {
     if (!at) touched_.push_back(by * width_ + bx);
     at |= bits;
   }
-  /// Blocks in order of their keys; the layer is empty again.
+  /// Blocks in order of their keys; the layer, counted from its map's first, is empty again.
   std::vector<Block> take(uint32_t layer) {
     std::sort(touched_.begin(), touched_.end());
     std::vector<Block> blocks;
@@ -79,8 +86,9 @@ struct Range {
   int first, last;
 };
 Range cells_between(float low, float high, int resolution) {
-  return {std::clamp(int(std::floor(low - kSlack)), 0, resolution - 1),
-          std::clamp(int(std::floor(high + kSlack)), 0, resolution - 1)};
+  const float slack = slack_at(resolution);
+  return {std::clamp(int(std::floor(low - slack)), 0, resolution - 1),
+          std::clamp(int(std::floor(high + slack)), 0, resolution - 1)};
 }
 
 void mark_triangle(const Triangle& t, int layer, int resolution, Layer& out) {
@@ -89,14 +97,15 @@ void mark_triangle(const Triangle& t, int layer, int resolution, Layer& out) {
   whole.count = 3;
   const Vec3 low = glm::min(t.a, glm::min(t.b, t.c)), high = glm::max(t.a, glm::max(t.b, t.c));
   const Range z = cells_between(low.z, high.z, resolution);
+  const float slack = slack_at(resolution);
   for (int k = std::max(z.first, 2 * layer); k <= std::min(z.last, 2 * layer + 1); ++k) {
-    const Polygon slab = z.first == z.last ? whole : cut(whole, 2, float(k) - kSlack, float(k + 1) + kSlack);
+    const Polygon slab = z.first == z.last ? whole : cut(whole, 2, float(k) - slack, float(k + 1) + slack);
     float y0 = kInfinity, y1 = -kInfinity;
     for (int i = 0; i < slab.count; ++i) y0 = std::min(y0, slab.points[i].y), y1 = std::max(y1, slab.points[i].y);
     if (!slab.count) continue;
     const Range y = cells_between(y0, y1, resolution);
     for (int j = y.first; j <= y.last; ++j) {
-      const Polygon row = y.first == y.last ? slab : cut(slab, 1, float(j) - kSlack, float(j + 1) + kSlack);
+      const Polygon row = y.first == y.last ? slab : cut(slab, 1, float(j) - slack, float(j + 1) + slack);
       float x0 = kInfinity, x1 = -kInfinity;
       for (int i = 0; i < row.count; ++i) x0 = std::min(x0, row.points[i].x), x1 = std::max(x1, row.points[i].x);
       if (!row.count) continue;
@@ -137,6 +146,8 @@ void Occupied::build(const Scene& scene, int finest, unsigned threads, StopToken
   const auto width_of = [](int level) { return std::max(1u, (1u << level) / 4u); };
   const auto layers_of = [](int level) { return std::max(1u, (1u << level) / 2u); };
 
+  const auto in_map = [](size_t layer, int level) { return uint32_t(layer) & ((1u << layers_shift(level)) - 1u); };
+
   // Triangles by the layer where they begin; those that reach farther are met again in each.
   std::vector<size_t> first_triangle{0};
   for (const InstanceRecord& r : scene.instances())
@@ -175,7 +186,7 @@ void Occupied::build(const Scene& scene, int finest, unsigned threads, StopToken
         for (size_t l = begin; l < end && !stop.stop(); ++l) {
           for (uint32_t i = starts[l]; i < starts[l + 1]; ++i)
             mark_triangle(triangles[order[i]], int(l), resolution, layer);
-          blocks[l] = layer.take(uint32_t(l));
+          blocks[l] = layer.take(in_map(l, finest));
         }
       },
       stop);
@@ -188,13 +199,20 @@ void Occupied::build(const Scene& scene, int finest, unsigned threads, StopToken
     OccupiedLevel& out = levels_[size_t(level)];
     out.width_ = width_of(level);
     const double at = now();
-    std::vector<Block> all;
-    for (const std::vector<Block>& layer : blocks) all.insert(all.end(), layer.begin(), layer.end());
+    out.layers_shift_ = layers_shift(level);
     uint64_t cells = 0;
-    for (Block& b : all) b.first = uint32_t(cells), cells += uint32_t(std::popcount(b.bits));
-    out.cells_ = cells, out.blocks_ = all.size();
-    out.map_.build(all);
-    size_t held = out.map_.bytes() + 2 * all.size() * sizeof(Block);
+    size_t most = 0;
+    for (size_t first = 0, each = size_t(1) << out.layers_shift_; first < blocks.size(); first += each) {
+      std::vector<Block> all;
+      for (size_t l = first; l < std::min(first + each, blocks.size()); ++l)
+        all.insert(all.end(), blocks[l].begin(), blocks[l].end());
+      for (Block& b : all) b.first = uint32_t(cells), cells += uint32_t(std::popcount(b.bits));
+      if (cells >= kNone) throw Unsupported("cells: a level holds more of them than 32 bits count");
+      out.blocks_ += all.size(), most = std::max(most, all.size());
+      out.maps_.emplace_back().build(all);
+    }
+    out.cells_ = cells;
+    size_t held = out.map_bytes() + (out.blocks_ + most) * sizeof(Block);
     for (int l = level + 1; l <= finest; ++l) held += levels_[size_t(l)].map_bytes();
     peak_bytes_ = std::max(peak_bytes_, held);
     seconds_maps_ += now() - at;
@@ -206,11 +224,11 @@ void Occupied::build(const Scene& scene, int finest, unsigned threads, StopToken
       for (size_t l = begin; l < end; ++l) {
         for (size_t half = 0; half < 2 && 2 * l + half < blocks.size(); ++half)
           for (const Block& b : blocks[2 * l + half]) {
-            const uint32_t in_layer = b.key - uint32_t(2 * l + half) * width * width;
+            const uint32_t in_layer = b.key % (width * width);
             const uint32_t bx = in_layer % width, by = in_layer / width;
             layer.mark(bx >> 1, by >> 1, halved(b.bits) << (2 * (bx & 1u) + 8 * (by & 1u) + 16 * half));
           }
-        coarse[l] = layer.take(uint32_t(l));
+        coarse[l] = layer.take(in_map(l, level - 1));
       }
     });
     blocks = std::move(coarse);
