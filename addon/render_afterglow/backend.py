@@ -54,9 +54,9 @@ def denoisers() -> list[dict[str, Any]]:
 _denoisers: list[dict[str, Any]] | None = None
 
 
-def denoise_problem() -> str:
-    """Why nothing can denoise here; empty when something can."""
-    known = denoisers()
+def denoise_problem(wanted: str = "AUTO") -> str:
+    """Why this denoiser, or any, cannot be used here; empty when it can."""
+    known = [d for d in denoisers() if wanted in ("AUTO", d["id"])]
     if any(d["available"] for d in known):
         return ""
     return "; ".join(f"{d['label']}: {d['reason']}" for d in known) or "no denoiser is known"

@@ -17,6 +17,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
+const float* given(const std::vector<float>& plane) { return plane.empty() ? nullptr : plane.data(); }
+
 struct Task {
   DenoiserMaker make;
   std::shared_ptr<Denoiser> denoiser;
@@ -33,13 +35,17 @@ struct Task {
       if (!denoiser) denoiser = make();
       const DenoiseImages& i = *images;
       denoiser->filter({.color = i.color.data(),
-                        .albedo = i.albedo.empty() ? nullptr : i.albedo.data(),
-                        .normal = i.normal.empty() ? nullptr : i.normal.data(),
+                        .albedo = given(i.albedo),
+                        .normal = given(i.normal),
+                        .surface = given(i.surface),
+                        .error = given(i.error),
+                        .seen = given(i.seen),
                         .width = i.width,
                         .height = i.height,
                         .fast = i.fast,
                         .prefilter = i.prefilter,
-                        .stop = StopToken(&stop)},
+                        .stop = StopToken(&stop),
+                        .threads = i.threads},
                        images->color.data());
     } catch (...) {
       caught = std::current_exception();

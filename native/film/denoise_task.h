@@ -15,8 +15,9 @@ namespace afterglow {
 /// Interleaved RGB images that the task owns.
 struct DenoiseImages {
   uint32_t width = 0, height = 0;
-  std::vector<float> color, albedo, normal;
+  std::vector<float> color, albedo, normal, surface, error, seen;
   bool fast = false, prefilter = false;
+  unsigned threads = 0;
 };
 
 using DenoiserMaker = std::function<std::shared_ptr<Denoiser>()>;

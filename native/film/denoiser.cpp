@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The list of denoisers and the one over OpenImageDenoise: a device and filters that live as long as the Denoiser,
+// The list of denoisers, and the one over OpenImageDenoise: a device and filters that live as long as the Denoiser,
 // images handed over without a copy unless they hold values that are not finite.
 #include "film/denoiser.h"
 
@@ -11,6 +11,7 @@
 
 #include "base/errors.h"
 #include "base/parallel.h"
+#include "film/layered_denoiser.h"
 #include "film/oidn.h"
 
 namespace afterglow {
@@ -222,12 +223,28 @@ std::vector<DenoiserInfo> list_denoisers(const std::vector<std::string>& search)
     oidn.version = version_text(library->version);
     oidn.reason.clear();
   }
-  return {oidn};
+  DenoiserInfo layered;
+  layered.id = kLayeredId, layered.label = "Layered Filter", layered.available = true;
+  return {oidn, layered};
+}
+
+std::string chosen_denoiser(const std::string& id, const std::vector<std::string>& search) {
+  if (id != "AUTO") return id;
+  for (const DenoiserInfo& known : list_denoisers(search))
+    if (known.available) return known.id;
+  return id;
+}
+
+PassSet denoise_passes(const std::string& chosen) {
+  if (chosen != kLayeredId) return kDenoisePasses;
+  return bit(Pass::kDenoiseNormal) | bit(Pass::kDenoiseSurface) | bit(Pass::kEmission) | bit(Pass::kEnvironment);
 }
 
 std::unique_ptr<Denoiser> make_denoiser(const std::string& id, const std::vector<std::string>& search) {
-  if (id != "AUTO" && id != kOidnId)
-    throw InvalidInput("denoiser \"" + id + "\" is unknown: AUTO or " + std::string(kOidnId));
+  const std::string chosen = chosen_denoiser(id, search);
+  if (chosen == kLayeredId) return make_layered_denoiser();
+  if (chosen != kOidnId)
+    throw InvalidInput("denoiser \"" + id + "\" is unknown: AUTO, " + kOidnId + " or " + kLayeredId);
   std::string reason;
   const auto library = load_oidn(search, reason);
   if (!library) throw Unsupported(reason);

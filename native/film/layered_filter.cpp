@@ -14,7 +14,6 @@ namespace afterglow {
 
 namespace {
 
-constexpr int kPasses = 3;
 constexpr float kKernel[3] = {3.0f / 8.0f, 1.0f / 4.0f, 1.0f / 16.0f};
 constexpr float kErrorScale = 16.0f;  // single samples of bounced light spread by a few times their mean
 constexpr float kExact = 0.06f;       // relative error below which light is left alone
@@ -154,7 +153,7 @@ void LayeredFilter::block(int x, int y, int step) {
   }
 }
 
-void LayeredFilter::run(unsigned threads, StopToken stop) {
+void LayeredFilter::run(unsigned threads, StopToken stop, int passes) {
   const auto rows = [&](const auto& what) {
     parallel_blocks(
         height_, 8, threads,
@@ -164,7 +163,7 @@ void LayeredFilter::run(unsigned threads, StopToken stop) {
         },
         stop);
   };
-  for (int pass = 0; pass < kPasses && !stop.stop(); ++pass) {
+  for (int pass = 0; pass < passes && !stop.stop(); ++pass) {
     rows([&](int y) {
       const size_t first = kMargin + size_t(y) * width_;
       std::fill_n(next_known_.begin() + ptrdiff_t(first), width_, 0.0f);

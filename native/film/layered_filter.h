@@ -27,7 +27,7 @@ float plane_stop(const LayerPixel& a, const LayerPixel& b, float reach);  // (3)
 float segment_stop(float a, float b);                                     // (4), relative
 float luminance_stop(const Rgb& a, const Rgb& b, float error);            // (6), relative to what is believed
 
-/// Three passes of a 5 × 5 kernel whose taps spread by 1, 2 and 4 pixels (Dammertz et al. 2010). Holes take the mean of
+/// Passes of a 5 × 5 kernel whose taps spread by 1, 2, 4, … pixels (Dammertz et al. 2010). Holes take the mean of
 /// what surrounds them on their surface. Pixels that are exact stay as they are. The same on any number of threads.
 /// One layer after another: begin(), set() for each pixel that has a surface there, run(), light() of each.
 class LayeredFilter {
@@ -36,7 +36,7 @@ class LayeredFilter {
   void begin(uint32_t width, uint32_t height);
   /// Pixels may be set from several threads, each once.
   void set(size_t pixel, const LayerPixel&);
-  void run(unsigned threads = 0, StopToken stop = {});
+  void run(unsigned threads = 0, StopToken stop = {}, int passes = 3);
   Rgb light(size_t pixel) const;
 
  private:

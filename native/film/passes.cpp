@@ -28,6 +28,7 @@ static const PassInfo kInfos[kPassCount] = {
     {"environment", 3},
     {"albedo", 3},
     {"denoise_normal", 3},
+    {"denoise_surface", kSurfaceFloats},
     {"sample_count", 1},
     {"error", 1},
     {"batches", kBatchCount},

@@ -31,11 +31,12 @@ enum class Pass : uint8_t {
   kEnvironment,
   kAlbedo,
   kDenoiseNormal,
+  kDenoiseSurface,
   kSampleCount,
   kError,
   kBatches,
 };
-inline constexpr int kPassCount = 24;
+inline constexpr int kPassCount = 25;
 inline constexpr int kBatchCount = 16;
 
 using PassSet = uint32_t;
@@ -49,6 +50,10 @@ inline constexpr PassSet kLightPasses = bits(Pass::kDiffuseDirect, Pass::kEnviro
 inline constexpr PassSet kColorPasses =
     bit(Pass::kDiffuseColor) | bit(Pass::kGlossyColor) | bit(Pass::kTransmissionColor);
 inline constexpr PassSet kDenoisePasses = bit(Pass::kAlbedo) | bit(Pass::kDenoiseNormal);
+/// Of denoise_surface, sums over the samples: of the first surface that is neither mirror nor glass, and light that was
+/// met at emitters and in the sky behind mirrors and glass, before or on it.
+inline constexpr int kSurfacePosition = 0, kSurfaceFootprint = 3, kSurfaceSegment = 4, kSurfaceMet = 5,
+                     kSurfaceAlbedo = 6, kSurfaceMirrored = 9, kSurfaceFloats = 12;
 /// Taken at the first surface, from the first sample alone or as a mean.
 inline constexpr PassSet kDataPasses = bits(Pass::kDepth, Pass::kMaterialIndex);
 

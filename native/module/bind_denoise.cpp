@@ -40,19 +40,39 @@ std::vector<float> rgb_of(const py::object& image, const std::string& what, uint
   return rgb;
 }
 
+/// The same values of an array of (h, w, channels), or (h, w) for one channel; empty for None.
+std::vector<float> plane_of(const py::object& image, const std::string& what, uint32_t width, uint32_t height,
+                            int channels) {
+  if (image.is_none()) return {};
+  const auto array = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(image);
+  const bool fits = array && array.ndim() >= 2 && array.shape(0) == py::ssize_t(height) &&
+                    array.shape(1) == py::ssize_t(width) && array.size() == py::ssize_t(width) * height * channels;
+  if (!fits) {
+    PyErr_Clear();
+    throw InvalidInput("denoise: " + what + " must hold " + std::to_string(channels) +
+                       " values for each pixel of color");
+  }
+  return {array.data(), array.data() + array.size()};
+}
+
+const float* given(const std::vector<float>& plane) { return plane.empty() ? nullptr : plane.data(); }
+
 py::array_t<float> denoise(const py::object& color, const py::object& albedo, const py::object& normal,
-                           const std::string& id, const std::vector<std::string>& search, bool prefilter) {
+                           const std::string& id, const std::vector<std::string>& search, bool prefilter,
+                           const py::object& surface, const py::object& error, const py::object& seen) {
   uint32_t width = 0, height = 0;
   const std::vector<float> c = rgb_of(color, "color", width, height);
   if (c.empty()) throw InvalidInput("denoise: color must hold pixels");
   const std::vector<float> a = rgb_of(albedo, "albedo", width, height), n = rgb_of(normal, "normal", width, height);
+  const std::vector<float> s = plane_of(surface, "surface", width, height, kSurfaceFloats),
+                           e = plane_of(error, "error", width, height, 1), own = rgb_of(seen, "seen", width, height);
   py::array_t<float> result({py::ssize_t(height), py::ssize_t(width), py::ssize_t(3)});
   float* output = result.mutable_data();
   const py::gil_scoped_release free;
   DenoiseInput input;
   input.color = c.data();
-  input.albedo = a.empty() ? nullptr : a.data();
-  input.normal = n.empty() ? nullptr : n.data();
+  input.albedo = given(a), input.normal = given(n);
+  input.surface = given(s), input.error = given(e), input.seen = given(own);
   input.width = width, input.height = height;
   input.prefilter = prefilter;
   borrow_denoiser(id, search)->filter(input, output);
@@ -65,7 +85,8 @@ void bind_denoise(py::module_& m) {
   m.def("denoisers", &list, py::arg("search") = std::vector<std::string>{});
   m.def("denoise", &denoise, py::arg("color"), py::arg("albedo") = py::none(), py::arg("normal") = py::none(),
         py::kw_only(), py::arg("denoiser") = "AUTO", py::arg("search") = std::vector<std::string>{},
-        py::arg("prefilter") = false);
+        py::arg("prefilter") = false, py::arg("surface") = py::none(), py::arg("error") = py::none(),
+        py::arg("seen") = py::none());
 }
 
 }  // namespace afterglow

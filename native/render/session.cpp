@@ -255,7 +255,10 @@ void Session::run(RenderSettings settings) {
     method_settings.emplace_back("accuracy", double(settings.accuracy));
     method_settings.emplace_back("denoise", settings.denoise);
     renderer.configure(method_settings);
-    if (settings.denoise) settings.film.passes |= kDenoisePasses;
+    if (settings.denoise) {
+      settings.denoiser = chosen_denoiser(settings.denoiser, settings.denoiser_search);
+      settings.film.passes |= denoise_passes(settings.denoiser);
+    }
     const bool carries = settings.carry_over && renderer.carries();
     if (carries) settings.film.passes |= Film::kCarriedPasses;
     const bool looks = settings.sight && renderer.looks();

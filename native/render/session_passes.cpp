@@ -42,6 +42,23 @@ std::vector<PixelNoise> noise_of(const Film& film) {
   return pixels;
 }
 
+/// Surfaces, the noise of each pixel's mean, and light that no surface reflects.
+template <class Read>
+void add_layered_guides(const Film& film, DenoiseImages& images, const Read& read) {
+  read(images.surface, Pass::kDenoiseSurface);
+  read(images.seen, Pass::kEmission);
+  if (!film.settings().transparent) {
+    std::vector<float> sky;
+    read(sky, Pass::kEnvironment);
+    for (size_t i = 0; i < sky.size(); ++i) images.seen[i] += sky[i];
+  }
+  for (size_t i = 0; i < images.seen.size(); ++i)
+    images.seen[i] += images.surface[i / 3 * kSurfaceFloats + kSurfaceMirrored + i % 3] * film.settings().exposure;
+  const std::vector<PixelNoise> noise = noise_of(film);
+  images.error = relative_deviations(noise, film.width(), film.height());
+  for (size_t p = 0; p < noise.size(); ++p) images.error[p] /= std::sqrt(float(std::max(1u, noise[p].samples)));
+}
+
 BelievedError spread_of(const Film& film) {
   const float spread = film.spread();
   return {spread, spread, spread};
@@ -100,7 +117,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     extra_ = renderer.extra();
     stage_ = "rendering";
   }
-  if (renderer.extra() > 0.0f) film.keep_noise();
+  if (renderer.extra() > 0.0f || (settings.denoise && settings.denoiser == kLayeredId)) film.keep_noise();
   const FilmSettings& f = film.settings();
   const uint64_t pixels = uint64_t(film.width()) * film.height();
   const ScheduleOptions options{before + wanted, settings.viewport, settings.time_limit > 0.0f,
@@ -224,17 +241,24 @@ bool Session::filter(const RenderSettings& settings, const Film& film, Image& im
   const size_t pixels = size_t(image.width) * image.height;
   const auto images = std::make_shared<DenoiseImages>();
   images->width = image.width, images->height = image.height;
-  for (std::vector<float>* plane : {&images->color, &images->albedo, &images->normal}) {  // a stop is obeyed after each
-    plane->resize(pixels * 3);
-    if (plane == &images->albedo) film.read(Pass::kAlbedo, plane->data());
-    if (plane == &images->normal) film.read(Pass::kDenoiseNormal, plane->data());
-    if (stop_) return false;
+  const bool layered = settings.denoiser == kLayeredId;
+  const auto read = [&](std::vector<float>& plane, Pass pass) {
+    plane.resize(pixels * pass_info(pass).channels);
+    if (!stop_) film.read(pass, plane.data());  // a stop is obeyed after each
+  };
+  if (layered) {
+    add_layered_guides(film, *images, read);
+  } else {
+    read(images->albedo, Pass::kAlbedo);
   }
+  read(images->normal, Pass::kDenoiseNormal);
+  images->color.resize(pixels * 3);
+  if (stop_) return false;
   for (size_t p = 0; p < pixels; ++p)
     for (size_t c = 0; c < 3; ++c) images->color[p * 3 + c] = image.rgba[p * 4 + c];
   const uint32_t kept = film.carries() && !settings.viewport ? typical_samples(film) : 0;
   const DenoisePlan plan = denoise_plan(settings.viewport, samples, kept);
-  images->fast = plan.fast, images->prefilter = plan.prefilter;
+  images->fast = plan.fast, images->prefilter = plan.prefilter, images->threads = settings.threads;
   try {
     if (denoiser_made_for_ != settings.denoiser) denoiser_.reset();
     denoiser_made_for_ = settings.denoiser;

@@ -220,7 +220,8 @@ class Session:
         max_bounces diffuse_bounces glossy_bounces transmission_bounces transparent_max_bounces
         sample_clamp_direct sample_clamp_indirect (0: off) caustics_reflective caustics_refractive
         pixel_filter "BLACKMAN_HARRIS"|"GAUSSIAN"|"BOX", filter_width; film_transparent; film_exposure
-        passes: names of the passes to keep (below); denoise: bool; denoiser "AUTO"|…
+        passes: names of the passes to keep (below); denoise: bool; denoiser "AUTO" (OpenImageDenoise where there is one)|
+        "OPENIMAGEDENOISE"|"LAYERED"
         viewport: bool (start coarse: passes at 1/8, 1/4, 1/2 of the resolution first)
         sight: bool (methods of a cache: rays that end at the first surface tell how much of a pixel at the edge of a window, a lamp
             or the sky shines; on by default)
@@ -250,7 +251,10 @@ class Session:
         """(height, width, channels) of the region, row 0 at the bottom; readable at any time, never stops the render.
         Names: combined (RGBA, premultiplied), depth mist position normal uv object_index material_index
         diffuse_direct diffuse_indirect diffuse_color glossy_direct glossy_indirect glossy_color transmission_direct
-        transmission_indirect transmission_color emission environment albedo denoise_normal sample_count
+        transmission_indirect transmission_color emission environment albedo denoise_normal denoise_surface (12, of the first
+        surface that is neither mirror nor glass: position from the scene's origin, footprint, length of the ray to it, share of samples
+        that met one, albedo; light of emitters and sky behind mirrors and glass: all sums over the samples by their number)
+        sample_count
         error (standard error of the mean, luminance), batches (16 batch means of luminance)"""
     def statistics(self) -> dict[str, Any]:
         """method, samples, seconds by stage (sync aside), rays by kind, believed_error, error_low/high (None for a method with a
@@ -263,9 +267,13 @@ def method_descriptions() -> list[dict[str, Any]]:
 def denoisers(search: Sequence[str] = ()) -> list[dict[str, Any]]:
     """[{id, label, available: bool, reason, path, version}]"""
 def denoise(color: NDArray[np.float32], albedo: NDArray[np.float32] | None = None, normal: NDArray[np.float32] | None = None,
-            *, denoiser: str = "AUTO", search: Sequence[str] = (), prefilter: bool = False) -> NDArray[np.float32]:
+            *, denoiser: str = "AUTO", search: Sequence[str] = (), prefilter: bool = False,
+            surface: NDArray[np.float32] | None = None, error: NDArray[np.float32] | None = None,
+            seen: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
     """RGB of images (height, width, 3 or 4); values that are not finite count as their neighbours' mean. prefilter: albedo
-    and normal are filtered first, which pays where they are noisy. Unsupported where no denoiser is found."""
+    and normal are filtered first, which pays where they are noisy. LAYERED needs normal (pass denoise_normal), surface (pass
+    denoise_surface) and error (relative, of each pixel), and leaves `seen` as it is: light of emitters and sky, met by the
+    camera's rays themselves or through mirrors and glass. Unsupported where the denoiser is not found."""
 def versions() -> dict[str, str]: ...   # embree, tbb, openimageio, pybind11, compiler
 def set_log(sink: Callable[[str, str], None] | None) -> None: ...
 
@@ -296,7 +304,7 @@ def measure_rays(scene: Scene, origins: NDArray[np.float64], directions: NDArray
     pairs. kind "closest", or "occluded": then directions are targets."""
 def occupied_cells(scene: Scene, levels: int, points: NDArray[np.float64] = ..., threads: int = 0,
                    normals: NDArray[np.float64] = ..., light: NDArray[np.float64] = ...) -> dict[str, Any]:
-    """Cells that hold geometry, on grids of 1 to 2^levels (at most 12) cells each way: cells, blocks, map_bytes and data_bytes a
+    """Cells that hold geometry, on grids of 1 to 2^levels (at most 14) cells each way: cells, blocks, maps, map_bytes and data_bytes a
     level, seconds_mark, seconds_maps, peak_bytes; index (levels + 1, N): each point's cell's data on each level, -1 where empty.
     Where each point brings light to the side that its normal faces, light (levels + 1, N, 3) is what its cells hold then."""
 def both_sides(normals: NDArray[np.float64], sums: NDArray[np.float64], samples: NDArray[np.int64], frames: NDArray[np.int64],

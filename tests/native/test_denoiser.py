@@ -45,7 +45,8 @@ def truth() -> np.ndarray:
 
 def test_a_copy_is_listed(copies: list[str]) -> None:
     for place in copies:
-        [found] = afterglow.denoisers([place])
+        found, layered = afterglow.denoisers([place])
+        assert layered["id"] == "LAYERED" and layered["available"]
         assert found["available"] and found["reason"] == "", found
         assert found["id"] == "OPENIMAGEDENOISE" and found["path"] and int(found["version"].split(".")[0]) in (1, 2)
 
@@ -188,15 +189,18 @@ def test_cancel_while_denoising(copies: list[str]) -> None:
 WITHOUT = """
 import sys
 import numpy as np, afterglow
-[known] = afterglow.denoisers(sys.argv[1:])
+known, layered = afterglow.denoisers(sys.argv[1:])
+assert layered["id"] == "LAYERED" and layered["available"], layered
 assert not known["available"] and known["reason"], known
 try:
-    afterglow.denoise(np.ones((4, 4, 3), np.float32), search=sys.argv[1:])
+    afterglow.denoise(np.ones((4, 4, 3), np.float32), denoiser="OPENIMAGEDENOISE", search=sys.argv[1:])
 except afterglow.Unsupported as error:
     assert str(error) == known["reason"], error
 else:
     raise AssertionError("denoised by nothing")
-render = afterglow.render("cornell_box", width=8, height=8, samples=2, denoise=True, denoiser_search=sys.argv[1:])
+picture = dict(width=8, height=8, samples=2, denoise=True, denoiser_search=sys.argv[1:])
+assert afterglow.render("cornell_box", **picture).statistics["denoiser"] == "LAYERED", "in its place"
+render = afterglow.render("cornell_box", denoiser="OPENIMAGEDENOISE", **picture)
 assert any("not denoised" in text for text in render.statistics["warnings"]), render.statistics
 assert np.isfinite(render.image).all() and render.image.max() > 0
 print(known["reason"])

@@ -112,6 +112,7 @@ class AFTERGLOW_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):
             "seed",
             *LIGHT_PATHS,
             "denoise",
+            "denoiser",
             "preview_accuracy",
             "preview_samples",
             "preview_short_rays",

@@ -12,6 +12,11 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from . import methods
 
+DENOISERS = [
+    ("AUTO", "Automatic", "OpenImageDenoise where this Blender brings it, else the layered filter", 0),
+    ("OPENIMAGEDENOISE", "OpenImageDenoise", "A neural network: less error, a little slower", 1),
+    ("LAYERED", "Layered Filter", "Averages along surfaces, as far as the samples are believed to be off. Always there", 2),
+]
 PIXEL_FILTERS = [
     ("BOX", "Box", "Every sample counts for the pixel it fell into", 0),
     ("GAUSSIAN", "Gaussian", "Soft edges", 1),
@@ -92,9 +97,14 @@ class AfterglowSceneSettings(bpy.types.PropertyGroup):
     )
     denoise: BoolProperty(
         name="Denoise",
-        description="Remove the noise that is left with OpenImageDenoise. It costs a little time and may "
-        "blur fine detail in light",
+        description="Remove the noise that is left. It costs a little time and may blur fine detail in light",
         default=False,
+    )
+    denoiser: EnumProperty(
+        name="Denoiser",
+        description="What removes the noise, in renders and in viewports",
+        items=DENOISERS,
+        default="AUTO",
     )
     film_exposure: FloatProperty(
         name="Exposure", description="Factor on the brightness of the image", default=1.0, min=0.0, soft_max=10.0
@@ -200,6 +210,7 @@ def session_settings(scene: bpy.types.Scene, viewport: bool) -> dict[str, Any]:
         pixel_filter=own.pixel_filter_type,
         film_transparent=scene.render.film_transparent,
         denoise=(own.use_preview_denoising if viewport else own.denoise) and not own.poll_denoise(),
+        denoiser=own.denoiser,
         viewport=viewport,
         carry_over=own.carry_over,
     )

@@ -137,6 +137,9 @@ class AFTERGLOW_RENDER_PT_denoise(PropertiesPanel, bpy.types.Panel):
         column.enabled = not problem
         column.prop(settings, "denoise", text="Render")
         column.prop(settings, "use_preview_denoising", text="Viewport")
+        layout.prop(settings, "denoiser")
+        if not problem and settings.denoiser != "AUTO":
+            problem = backend.denoise_problem(settings.denoiser)
         if problem:
             wrap(layout, "Not available here. " + problem, "INFO")
 

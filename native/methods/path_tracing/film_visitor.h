@@ -20,7 +20,11 @@ class FilmVisitor {
   FilmVisitor(const KernelInput& in, RayCounts& counts) : in_(in), layout_(in.film.layout()), counts_(counts) {}
 
   const float* sums() const { return sums_; }
-  void begin_pixel() { std::memset(sums_, 0, sizeof(float) * size_t(layout_.floats)); }
+  float squares() const { return squares_; }  // of the samples' luminances; 0 where no passes are kept
+  void begin_pixel() {
+    std::memset(sums_, 0, sizeof(float) * size_t(layout_.floats));
+    squares_ = 0.0f;
+  }
   void begin_sample(const PathState& path, uint32_t index) {
     batch_ = sums_ + layout_[Pass::kBatches] + int(batch_of(index));
     light_ = seen_ = Rgb(0.0f);
@@ -35,7 +39,9 @@ class FilmVisitor {
     float* combined = sums_ + layout_[Pass::kCombined];
     for (int c = 0; c < 3; ++c) combined[c] += light_[c];
     combined[3] += transparent_;
-    *batch_ += luminance(noisy());
+    const float noise = luminance(noisy());
+    *batch_ += noise;
+    if constexpr (kPasses) squares_ += noise * noise;
   }
 
   /// Depth, position and indexes are those in the middle of the pixel, as in Cycles: a walk before the first sample, of
@@ -105,6 +111,7 @@ class FilmVisitor {
         if (!features_known_) add(Pass::kAlbedo, glm::min(c, Rgb(1.0f)));
       } else {
         add_shared(path.context.depth == 1, c);
+        add_mirrored(c);
       }
     }
   }
@@ -120,7 +127,7 @@ class FilmVisitor {
       if (path.context.depth == 0)
         seen_ += hole ? Rgb(0.0f) : c, add(Pass::kEnvironment, c);
       else
-        add_shared(path.context.depth == 1, c);
+        add_shared(path.context.depth == 1, c), add_mirrored(c);
       if (!features_known_) add(Pass::kAlbedo, glm::min(c, Rgb(1.0f)));
     }
   }
@@ -158,6 +165,11 @@ class FilmVisitor {
     for (int c = 0; c < 3; ++c) sums_[at + c] += value[c];
   }
 
+  void add_mirrored(const Rgb& light) {
+    const int at = layout_[Pass::kDenoiseSurface];
+    for (int c = 0; at >= 0 && !features_known_ && c < 3; ++c) sums_[at + kSurfaceMirrored + c] += light[c];
+  }
+
   void add_shared(bool direct, const Rgb& light) {
     add(direct ? Pass::kDiffuseDirect : Pass::kDiffuseIndirect, light * diffuse_share_);
     add(direct ? Pass::kGlossyDirect : Pass::kGlossyIndirect, light * glossy_share_);
@@ -189,6 +201,7 @@ class FilmVisitor {
   RayCounts& counts_;
   const float least_limit_ = std::fmin(kMostLight, std::fmin(in_.clamp_indirect, in_.clamp_direct));
   float* batch_ = nullptr;
+  float squares_ = 0.0f;
   Rgb light_{0.0f}, seen_{0.0f};  // seen: of light, what the camera's ray met itself
   float transparent_ = 0.0f;
   Vec3 eye_{0.0f};
@@ -247,7 +260,7 @@ void FilmVisitor<kPasses, kLobes>::write_surface(const PathState& path, const Su
 template <bool kPasses, bool kLobes>
 void FilmVisitor<kPasses, kLobes>::write_features(const PathState& path, const SurfacePoint& point,
                                                   const Surface& surface) {
-  if (layout_[Pass::kAlbedo] < 0 && layout_[Pass::kDenoiseNormal] < 0) return;
+  if (layout_[Pass::kAlbedo] < 0 && layout_[Pass::kDenoiseNormal] < 0 && layout_[Pass::kDenoiseSurface] < 0) return;
   constexpr float kSharp = 0.075f * 0.075f;
   float sharp = 0.0f, all = 0.0f;
   for (int i = 0; i < surface.count; ++i) {
@@ -261,9 +274,16 @@ void FilmVisitor<kPasses, kLobes>::write_features(const PathState& path, const S
   if (sharp > 0.75f * all && !path.last && path.context.depth < 4) return;
   features_known_ = true;
   const SurfaceAlbedo color = albedo(surface, point.outgoing);
-  add(Pass::kAlbedo,
-      glm::min(path.throughput, Rgb(1.0f)) * glm::min(color.diffuse + color.glossy + color.transmission, Rgb(1.0f)));
+  const Rgb reflected =
+      glm::min(path.throughput, Rgb(1.0f)) * glm::min(color.diffuse + color.glossy + color.transmission, Rgb(1.0f));
+  add(Pass::kAlbedo, reflected);
   add(Pass::kDenoiseNormal, mean_normal(point, surface));
+  const int at = layout_[Pass::kDenoiseSurface];
+  if (at < 0) return;
+  float* kept = sums_ + at;
+  for (int c = 0; c < 3; ++c) kept[kSurfacePosition + c] += point.position[c], kept[kSurfaceAlbedo + c] += reflected[c];
+  kept[kSurfaceFootprint] += path.context.footprint, kept[kSurfaceSegment] += path.context.ray_length;
+  kept[kSurfaceMet] += 1.0f;
 }
 
 }  // namespace afterglow::path_tracing

@@ -28,8 +28,9 @@ template <uint32_t kFeatures>
 void render_request(const KernelInput& in, const PixelRequest& request, RayCounts& counts) {
   constexpr bool kPasses = kFeatures & kFeaturePasses;
   const Walker<kFeatures & 7u> walker(in.walk, counts);
-  // No material that reads its point, no need of a footprint.
-  const bool pinhole = in.camera.is_pinhole() && in.walk.scene.materials.all_plain();
+  // No material that reads its point and no pass that keeps it, no need of a footprint.
+  const bool pinhole =
+      in.camera.is_pinhole() && in.walk.scene.materials.all_plain() && in.film.layout()[Pass::kDenoiseSurface] < 0;
   FilmVisitor<kPasses, bool(kFeatures & kFeatureLobes)> visitor(in, counts);
   for (uint32_t y = request.y; y < uint32_t(request.y) + request.height; y += request.step)
     for (uint32_t x = request.x; x < uint32_t(request.x) + request.width; x += request.step) {
@@ -53,7 +54,7 @@ void render_request(const KernelInput& in, const PixelRequest& request, RayCount
         i += placing ? 0 : 1;
         placing = false;
       }
-      in.film.add(x, y, visitor.sums(), request.count);
+      in.film.add(x, y, visitor.sums(), request.count, visitor.squares());
     }
 }
 
