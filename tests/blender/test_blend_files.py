@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 
-@pytest.mark.parametrize("name", ["wobbling_cylinder", "kite", "bouncing_bunnies", "desk_with_chair", "spheres"])
+@pytest.mark.parametrize("name", ["wobbling_cylinder", "kite", "bouncing_bunnies", "desk_with_chair", "spheres",
+                                  "cornell_statue"])
 def test_motion_in_the_file_is_that_of_the_scene(in_blender: Callable[..., dict[str, Any]], blend_files: Path, name: str) -> None:
     found = in_blender(
         f"""
@@ -33,3 +34,17 @@ def test_motion_in_the_file_is_that_of_the_scene(in_blender: Callable[..., dict[
     )
     assert found["checked"] >= 3
     assert found["off"] < 1e-5
+
+
+def test_one_file_holds_one_two_four_and_nine_bunnies(in_blender: Callable[..., dict[str, Any]], blend_files: Path) -> None:
+    found = in_blender(
+        """
+        result(moving={scene.name: sum(o.animation_data is not None for o in scene.objects if o.name.startswith("Bunny"))
+                       for scene in bpy.data.scenes},
+               meshes=sum(len(mesh.polygons) > 60000 for mesh in bpy.data.meshes),
+               all=[sum(o.name.startswith("Bunny") for o in scene.objects) for scene in bpy.data.scenes])
+        """,
+        blend_files / "bouncing_bunnies.blend",
+    )
+    assert found["moving"] == {"bouncing_bunnies": 9, "bouncing_bunnies_1": 1, "bouncing_bunnies_2": 2, "bouncing_bunnies_4": 4}
+    assert found["meshes"] == 1 and found["all"] == [9, 9, 9, 9]

@@ -13,6 +13,8 @@ SCENES: dict[str, Callable[..., Description]] = {
     "cornell_box": rooms.cornell_box,
     **{f"cornell_{v}": partial(rooms.cornell_box, v)
        for v in ("glossy", "glass", "textured", "many_lights", "indirect", "statue", "emissive", "mirror")},
+    "mirror_floor": partial(rooms.floor_room, "mirror"),
+    "glass_floor": partial(rooms.floor_room, "glass"),
     "furnace": rooms.furnace,
     "world_furnace": rooms.world_furnace,
     "sealed_box": rooms.sealed_box,
@@ -38,6 +40,10 @@ BLEND_FILES: dict[str, Callable[..., Description]] = {
     **{name: scene for name, scene in SCENES.items() if name != "world_furnace"},
     "wobbling_cylinder": partial(moving.wobbling_cylinder, 64, 64),
 }
+# Further scenes of a file, which share its meshes: how many of the nine bunnies bounce.
+FURTHER_SCENES: dict[str, dict[str, Callable[..., Description]]] = {
+    "bouncing_bunnies": {f"bouncing_bunnies_{n}": partial(moving.bouncing_bunnies, moving=n) for n in (1, 2, 4)},
+}
 
 
 def make(name: str) -> Description:
@@ -48,6 +54,6 @@ def make(name: str) -> Description:
 
 
 __all__ = [
-    "BLEND_FILES", "SCENES", "Camera", "Description", "Light", "Mesh", "Node", "Object", "Picture", "look_at", "make", "node",
-    "rotate", "scale", "translate",
+    "BLEND_FILES", "FURTHER_SCENES", "SCENES", "Camera", "Description", "Light", "Mesh", "Node", "Object", "Picture", "look_at",
+    "make", "node", "rotate", "scale", "translate",
 ]

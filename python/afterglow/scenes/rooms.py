@@ -106,8 +106,43 @@ def cornell_box(variant: str = "diffuse", lights: int = 64) -> Description:
         scene.lights = _light_grid(lights)
     elif variant == "statue":
         scene.add("Statue", statue(), "white", transform=translate((0, 0.1, 0)) @ scale(1.5))
+        scene.frames = (1, 48)
+        scene.materials["fur"] = diffuse((0.25, 0.35, 0.6))
+        scene.add("Bunny", bunny(21), "fur", move=_around_statue)
     else:
         raise ValueError(f"no Cornell box {variant!r}")
+    return scene
+
+
+def _around_statue(frame: float) -> Any:
+    """A hop a quarter turn, once around in 48 frames."""
+    t = 2 * math.pi * (frame - 1) / 48
+    lift = 0.12 * abs(math.sin(2 * t))
+    return translate((0, 0.1, lift)) @ rotate(t) @ translate((0, -0.68, 0)) @ rotate(math.pi / 2) @ scale(0.4)
+
+
+def floor_room(sheet: str = "mirror") -> Description:
+    """A Cornell box whose floor shows its walls, blocks and ball once more. sheet: "mirror", the whole floor; "glass", a pane
+    0.12 above a checkered diffuse floor, which is seen refracted through both of its faces."""
+    scene = _cornell_room(f"{sheet}_floor", "mesh")
+    scene.camera = Camera(look_at((0, -3.7, 1.75), (0, 0, 0.65)), math.radians(39.0))
+    _blocks(scene, gap=0.2)
+    # Both blocks and the ball stand free of the sheet, so that nothing lies in its plane.
+    scene.objects[-2].transforms = translate((0, 0, 0.2)) @ scale((1, 1, 0.9)) @ scene.objects[-2].transforms
+    scene.materials["blue"] = diffuse((0.12, 0.25, 0.6))
+    scene.add("Ball", sphere(0.22, 48, 24), "blue", transform=translate((-0.45, -0.5, 0.45)))
+    if sheet == "mirror":
+        scene.materials["sheet"] = node("glossy_bsdf", {"distribution": "sharp"}, color=(0.85, 0.87, 0.88), roughness=0.0)
+        scene.add("Sheet", quad((-1, -1, 0.01), (1, -1, 0.01), (1, 1, 0.01), (-1, 1, 0.01)), "sheet")
+    elif sheet == "glass":
+        scene.materials["sheet"] = node("glass_bsdf", {"distribution": "ggx"}, color=(0.95, 1, 0.97), roughness=0.0, ior=1.5)
+        checker = node("checker_texture", vector=node("texture_coordinate").out("uv"), color1=(0.7, 0.6, 0.4),
+                       color2=(0.2, 0.25, 0.4), scale=8.0)
+        scene.materials["checker"] = diffuse(checker)  # type: ignore[arg-type]
+        scene.add("Tiles", quad((-1, -1, 0.005), (1, -1, 0.005), (1, 1, 0.005), (-1, 1, 0.005)), "checker")
+        scene.add("Sheet", box((-0.98, -0.98, 0.12), (0.98, 0.98, 0.17)), "sheet")
+    else:
+        raise ValueError(f"no floor of {sheet!r}")
     return scene
 
 

@@ -140,8 +140,8 @@ def bunny(divisions: int = 76) -> Mesh:
     return Mesh(points / points[:, 2].max(), triangles, smooth=True)
 
 
-def statue(segments: int = 96, rings: int = 160) -> Mesh:
-    """A twisted, fluted figure on a plinth, about one unit high, 2 · segments · rings triangles (30,720)."""
+def statue(segments: int = 136, rings: int = 220) -> Mesh:
+    """A twisted, fluted figure on a plinth, about one unit high, 2 · segments · (rings − 1) triangles (59,568)."""
     t = np.linspace(0, 1, rings + 1)
     outline = 0.13 + 0.05 * np.cos(7.5 * t) + 0.04 * np.sin(17 * t) * t - 0.09 * t**6
     outline = np.where(t < 0.08, 0.26, np.where(t < 0.12, 0.22, outline))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The figures of the HashCache."""
 
-from . import cells, frames, times, views
+from . import cells, filters, frames, times, views
 
 FIGURES = {
     "camera_path": views.camera_path,
@@ -15,6 +15,7 @@ FIGURES = {
     "reconstruction": cells.reconstruction,
     "caching": cells.caching,
     "layers": views.layers,
+    "filters": filters.measure,
     "methods_apart": views.methods_apart,
     "threads": views.threads,
 }

@@ -24,6 +24,7 @@ FIRST: dict[str, Case] = {
     "office_with_blinds": Case(partial(scenes.make, "office_with_blinds"), (0.51, 0.05)),
 }
 MOVING: dict[str, Case] = {
+    "cornell_statue": Case(partial(scenes.make, "cornell_statue"), moving=(0.43, 0.09, 0.03)),
     "wobbling_cylinder": Case(partial(scenes.make, "wobbling_cylinder"), moving=(0.37, 0.09, 0.03)),
     "desk_with_chair": Case(partial(scenes.make, "desk_with_chair"), moving=(0.56, 0.09, 0.03)),
     "bunnies_1": Case(bunnies(1), moving=(0.56, 0.12, 0.03)),
@@ -31,7 +32,7 @@ MOVING: dict[str, Case] = {
     "bunnies_4": Case(bunnies(4), moving=(0.55, 0.13, 0.05)),
     "bunnies_9": Case(bunnies(9), moving=(0.57, 0.12, 0.09)),
 }
-ONE_MOVES = {"wobbling_cylinder", "desk_with_chair", "bunnies_1"}
+ONE_MOVES = {"cornell_statue", "wobbling_cylinder", "desk_with_chair", "bunnies_1"}
 WHOLE = ("desk_with_chair", "bunnies_1", "cornell_mirror")
 
 
