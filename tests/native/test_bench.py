@@ -14,6 +14,8 @@ from afterglow.bench.foundation.kitchen import fewest
 from afterglow.bench.foundation.light_passes import DIVIDED, compare, describe, light_of, resolved
 from afterglow.bench.foundation.sync import staged
 from afterglow.bench.hash_cache.charts import charts
+from afterglow.bench.instant_cache import charts as instant_charts
+from afterglow.bench.instant_cache import tables
 
 
 @pytest.mark.parametrize(("goal", "value", "holds", "margin"), [
@@ -90,6 +92,28 @@ def test_figures_are_chosen_by_key() -> None:
     assert "camera_path" in bench.chosen("hash_cache", [])
     with pytest.raises(KeyError, match="no figure 'colour'"):
         bench.chosen("foundation", ["colour"])
+
+
+def test_charts_of_the_instant_cache_are_drawn_from_what_was_measured() -> None:
+    names = ("default", "finer", "finest")
+    levels = {name: {"seconds": 2.0**i, "relmse": 0.1 / 2**i, "error": 0.001} for i, name in enumerate(names)}
+    figures = [{"figure": "relMSE against path tracing, finest setting", "scene": "desk_with_chair",
+                "details": {"levels": levels}}, {"figure": "other", "scene": "", "details": {}}]
+    [(name, text)] = instant_charts.charts(figures).items()
+    assert name == "instant_cache_error.svg" and "desk with chair" in text
+    assert instant_charts.charts(figures[1:]) == {}
+
+
+def test_tables_have_the_papers_numbers_beside_ours() -> None:
+    stages = {kind: {"update": 0.1 * n, "fill": 0.0, "interpolate": 0.0, "filter": 0.0, "walk": 0.1, "film": 0.0}
+              for n, kind in enumerate(("TIC", "IC", "IGI"), 1)}
+    figures = [{"figure": "diffuse part, TIC over IGI", "scene": "desk_with_chair", "value": 0.1, "details": {"stages": stages}},
+               {"figure": "diffuse part of the first frame, IC over IGI", "scene": "desk_with_chair", "value": 0.1,
+                "details": {"stages": {kind: [found] for kind, found in stages.items()}}},
+               {"figure": "pixels with FLIP above 0.1, IC against IGI", "scene": "desk_with_chair", "value": 3.5, "details": {}}]
+    text = tables.tables(figures)
+    for number in ("3.62", "9.33", "6.82", "18.67", "2.11"):
+        assert number in text, (number, text)
 
 
 def test_charts_of_the_hash_cache_are_drawn_from_what_was_measured() -> None:
