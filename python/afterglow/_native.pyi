@@ -223,8 +223,8 @@ class Session:
         passes: names of the passes to keep (below); denoise: bool; denoiser "AUTO" (OpenImageDenoise where there is one)|
         "OPENIMAGEDENOISE"|"LAYERED"
         viewport: bool (start coarse: passes at 1/8, 1/4, 1/2 of the resolution first)
-        sight: bool (methods of a cache: rays that end at the first surface tell how much of a pixel at the edge of a window, a lamp
-            or the sky shines; on by default)
+        sight: bool (methods of a cache: rays that end at the first surface tell how much of a pixel at the edge of a window, a
+            lamp or the sky shines; on by default)
         carry_over: bool (methods whose answers have no noise: where an edit, or in final renders what changed since the last
             one, leaves a pixel as it is, its samples stay; `samples` is what every pixel has then; direct light is smoothed)
         mist (start, depth, "quadratic"|"linear"|"inverse_quadratic")
@@ -252,8 +252,9 @@ class Session:
         Names: combined (RGBA, premultiplied), depth mist position normal uv object_index material_index
         diffuse_direct diffuse_indirect diffuse_color glossy_direct glossy_indirect glossy_color transmission_direct
         transmission_indirect transmission_color emission environment albedo denoise_normal denoise_surface (12, of the first
-        surface that is neither mirror nor glass: position from the scene's origin, footprint, length of the ray to it, share of samples
-        that met one, albedo; light of emitters and sky behind mirrors and glass: all sums over the samples by their number)
+        surface that is neither mirror nor glass: position from the scene's origin, footprint, length of the ray to it, share of
+        samples that met one, albedo; light of emitters and sky behind mirrors and glass: all sums over the samples by
+        their number)
         sample_count
         error (standard error of the mean, luminance), batches (16 batch means of luminance)"""
     def statistics(self) -> dict[str, Any]:
@@ -304,9 +305,10 @@ def measure_rays(scene: Scene, origins: NDArray[np.float64], directions: NDArray
     pairs. kind "closest", or "occluded": then directions are targets."""
 def occupied_cells(scene: Scene, levels: int, points: NDArray[np.float64] = ..., threads: int = 0,
                    normals: NDArray[np.float64] = ..., light: NDArray[np.float64] = ...) -> dict[str, Any]:
-    """Cells that hold geometry, on grids of 1 to 2^levels (at most 14) cells each way: cells, blocks, maps, map_bytes and data_bytes a
-    level, seconds_mark, seconds_maps, peak_bytes; index (levels + 1, N): each point's cell's data on each level, -1 where empty.
-    Where each point brings light to the side that its normal faces, light (levels + 1, N, 3) is what its cells hold then."""
+    """Cells that hold geometry, on grids of 1 to 2^levels (at most 14) cells each way: cells, blocks, maps, map_bytes and
+    data_bytes a level, seconds_mark, seconds_maps, peak_bytes; index (levels + 1, N): each point's cell's data on each level,
+    -1 where empty. Where each point brings light to the side that its normal faces, light (levels + 1, N, 3) is what its
+    cells hold then."""
 def both_sides(normals: NDArray[np.float64], sums: NDArray[np.float64], samples: NDArray[np.int64], frames: NDArray[np.int64],
                changed: int = 0) -> dict[str, Any]:
     """A cell of that structure after so many updates, each a sum of samples that come to the side of a normal in a frame, the

@@ -222,7 +222,8 @@ def test_the_first_frame_takes_samples_for_those_that_follow() -> None:
     def counts(place: tuple[float, float, float], **more: Any) -> np.ndarray:
         built.scene.set_transforms(built.instances["Ball"], np.asarray(translate(place), np.float64)[None])
         built.scene.commit()
-        settings = {**SETTINGS, "viewport": False, "samples": 3, "cache_first": 20, "passes": ["combined", "sample_count"], **more}
+        settings = {**SETTINGS, "viewport": False, "samples": 3, "cache_first": 20, "passes": ["combined", "sample_count"],
+                    **more}
         session = afterglow.Session(built.scene, settings)
         session.start()
         session.wait()

@@ -139,8 +139,8 @@ def test_old_light_fades(edit: str) -> None:
 
 
 def test_how_much_old_light_counts_for() -> None:
-    """All of it without a doubt, none where it would be noisier than six samples, and where there is a doubt fewer samples than paths
-    end in (32) however many there were; more doubt never counts for more."""
+    """All of it without a doubt, none where it would be noisier than six samples, and where there is a doubt fewer samples than
+    paths end in (32) however many there were; more doubt never counts for more."""
     counts, doubts = [0, 1, 5, 6, 24, 100, 5000, 2**19 - 1], np.concatenate([[0.0], np.geomspace(1e-7, 1.0, 200)])
     worth = np.array([[_native.samples_worth(n, d) for d in doubts] for n in counts])
     assert (worth[:, 0] == counts).all() and (np.diff(worth, axis=1) <= 0).all() and (np.diff(worth, axis=0) >= 0).all()

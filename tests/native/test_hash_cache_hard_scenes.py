@@ -13,7 +13,7 @@ from afterglow.scenes import SCENES, Camera, Description, Light, Mesh, look_at, 
 from afterglow.scenes.native import Built, graph
 from afterglow.scenes.rooms import background, diffuse, emission, furnace
 from afterglow.scenes.shapes import box, flipped, join, quad, sphere, transformed
-from hard_cases import Mean, agree, ball_grid, mean, render
+from hard_cases import Mean, agree, ball_grid, mean
 from test_hash_cache import Live, indirect
 
 PATHS: dict[str, Any] = dict(size=16, diffuse_bounces=4, max_bounces=12, caustics_reflective=False, caustics_refractive=False)

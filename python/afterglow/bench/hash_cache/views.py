@@ -73,7 +73,8 @@ def rival_flicker(samples: int = 16, frames: int = 4) -> metrics.Estimate:
     file, reference = scene()
     with blenders.Worker.of_official("5.0", addon=False) as worker:
         worker.open(file, PERCENT)
-        shots = [images.read(worker.render("CYCLES", samples=samples, denoise=True, seed=seed)["image"]) for seed in range(frames)]
+        shots = [images.read(worker.render("CYCLES", samples=samples, denoise=True, seed=seed)["image"])
+                 for seed in range(frames)]
     return metrics.still_flicker(shots, images.read(reference))
 
 
