@@ -217,12 +217,15 @@ void Film::read_pixel(Pass pass, const float* sums, uint32_t samples, float* out
   }
 }
 
-void Film::read(Pass pass, float* out, uint32_t step) const {
+void Film::read(Pass pass, float* out, uint32_t step, StopToken stop) const {
   if (pass == Pass::kError) return read_error(out, step);
   // Rows that are shown as an earlier one stay in that one's block.
-  parallel_blocks(height(), std::max(step, 16u) / step * step, [&](size_t begin, size_t end) {
-    for (size_t y = begin; y < end; ++y) read_row(pass, out, uint32_t(y), step);
-  });
+  parallel_blocks(
+      height(), std::max(step, 16u) / step * step, 0,
+      [&](size_t begin, size_t end) {
+        for (size_t y = begin; y < end; ++y) read_row(pass, out, uint32_t(y), step);
+      },
+      stop);
 }
 
 void Film::carry_over() {

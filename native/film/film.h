@@ -122,7 +122,7 @@ class Film {
 
   /// A pass over the region, row 0 at the bottom, pass_info(pass).channels values a pixel. step > 1: only every step-th
   /// pixel has samples; the others are shown as their block's first.
-  void read(Pass, float* out, uint32_t step = 1) const;
+  void read(Pass, float* out, uint32_t step = 1, StopToken stop = {}) const;
   BelievedError believed_error() const;
 
  private:

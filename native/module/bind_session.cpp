@@ -289,7 +289,7 @@ void bind_session(py::module_& m) {
   m.def("caching_share", &caching_share, py::arg("view_moved"), py::arg("step"));
   m.def(
       "denoise_plan",
-      [](bool viewport, double samples, uint32_t kept) {
+      [](bool viewport, uint32_t samples, uint32_t kept) {
         const DenoisePlan plan = denoise_plan(viewport, samples, kept);
         return py::make_tuple(plan.prefilter, plan.fast);
       },

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/parallel.h"
 #include "base/sampler.h"
 
 namespace afterglow {
@@ -20,7 +21,8 @@ struct Near {
 
 }  // namespace
 
-std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, uint32_t width, uint32_t height) {
+std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, uint32_t width, uint32_t height,
+                                       StopToken stop) {
   double total = 0.0;
   uint64_t known = 0;
   for (const PixelNoise& p : pixels)
@@ -28,7 +30,7 @@ std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, ui
   std::vector<float> deviations(pixels.size(), 0.0f);
   if (!known || !(total > 0.0)) return deviations;
   const float bright = 2.0f * float(total / double(known)), floor = 0.01f * bright * bright;
-  for (int y = 0; y < int(height); ++y)
+  const auto look_at_row = [&](int y) {
     for (int x = 0; x < int(width); ++x) {
       Near near;
       for (int j = std::max(0, y - 1); j <= std::min(int(height) - 1, y + 1); ++j)
@@ -48,6 +50,13 @@ std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, ui
           near.known > 0.0f ? near.variance / near.known : std::max(0.0f, near.mean_square / near.weight - mean * mean);
       deviations[size_t(y) * width + size_t(x)] = std::sqrt(variance / (level * level + floor));
     }
+  };
+  parallel_blocks(
+      height, 8, 0,
+      [&](size_t begin, size_t end) {
+        for (size_t y = begin; y < end; ++y) look_at_row(int(y));
+      },
+      stop);
   return deviations;
 }
 

@@ -13,8 +13,9 @@ namespace afterglow {
 
 /// Deviation of one sample of each pixel, in units of the relative error: sqrt(variance / (mean² + 0.01 · (2 · image
 /// mean)²)). Variances and means are shared by 3 × 3 neighbours; where pixels have one sample, it is the neighbours'
-/// spread that counts.
-std::vector<float> relative_deviations(const std::vector<PixelNoise>&, uint32_t width, uint32_t height);
+/// spread that counts. Not to be used once it was stopped.
+std::vector<float> relative_deviations(const std::vector<PixelNoise>&, uint32_t width, uint32_t height,
+                                       StopToken stop = {});
 
 /// How many samples each pixel gets, `budget` in all at most: those that bring it nearest to a number in proportion to
 /// its deviation. No pixel gets more than `most` for each that it has. `seed` decides what fractions are rounded to.

@@ -35,7 +35,7 @@ uint32_t coarsest_step(uint64_t pixels, double sample_seconds) {
   return step;
 }
 
-DenoisePlan denoise_plan(bool viewport, double samples, uint32_t kept) {
+DenoisePlan denoise_plan(bool viewport, uint32_t samples, uint32_t kept) {
   const bool clean = kept >= kPrefilterTo;
   return {.prefilter = !viewport && !clean && samples >= kPrefilterFrom, .fast = viewport || clean};
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/errors.h"
+#include "base/parallel.h"
 #include "film/denoise_task.h"
 #include "render/extra_samples.h"
 #include "render/session.h"
@@ -38,24 +39,28 @@ InstanceMask local_view_mask(const Scene& scene, const std::vector<uint32_t>& ha
 
 std::vector<PixelNoise> noise_of(const Film& film) {
   std::vector<PixelNoise> pixels(size_t(film.width()) * film.height());
-  for (size_t p = 0; p < pixels.size(); ++p) pixels[p] = film.noise(p);
+  parallel_blocks(pixels.size(), 16384, [&](size_t begin, size_t end) {
+    for (size_t p = begin; p < end; ++p) pixels[p] = film.noise(p);
+  });
   return pixels;
 }
 
 /// Surfaces, the noise of each pixel's mean, and light that no surface reflects.
 template <class Read>
-void add_layered_guides(const Film& film, DenoiseImages& images, const Read& read) {
+void add_layered_guides(const Film& film, DenoiseImages& images, const Read& read, StopToken stop) {
   read(images.surface, Pass::kDenoiseSurface);
   read(images.seen, Pass::kEmission);
   if (!film.settings().transparent) {
     std::vector<float> sky;
     read(sky, Pass::kEnvironment);
-    for (size_t i = 0; i < sky.size(); ++i) images.seen[i] += sky[i];
+    for (size_t i = 0; i < sky.size() && i < images.seen.size(); ++i) images.seen[i] += sky[i];
   }
+  if (stop.stop()) return;
   for (size_t i = 0; i < images.seen.size(); ++i)
     images.seen[i] += images.surface[i / 3 * kSurfaceFloats + kSurfaceMirrored + i % 3] * film.settings().exposure;
   const std::vector<PixelNoise> noise = noise_of(film);
-  images.error = relative_deviations(noise, film.width(), film.height());
+  if (stop.stop()) return;
+  images.error = relative_deviations(noise, film.width(), film.height(), stop);
   for (size_t p = 0; p < noise.size(); ++p) images.error[p] /= std::sqrt(float(std::max(1u, noise[p].samples)));
 }
 
@@ -233,21 +238,24 @@ void Session::publish(const RenderSettings& settings, const Film& film, uint32_t
 bool Session::filter(const RenderSettings& settings, const Film& film, Image& image) {
   set_stage("denoising");
   const double begun = now();
-  double samples;
+  uint32_t samples;
   {
     const std::lock_guard lock(mutex_);
-    samples = statistics_.samples * (1.0 + extra_);
+    samples = statistics_.samples;
   }
   const size_t pixels = size_t(image.width) * image.height;
   const auto images = std::make_shared<DenoiseImages>();
   images->width = image.width, images->height = image.height;
   const bool layered = settings.denoiser == kLayeredId;
   const auto read = [&](std::vector<float>& plane, Pass pass) {
-    plane.resize(pixels * pass_info(pass).channels);
-    if (!stop_) film.read(pass, plane.data());  // a stop is obeyed after each
+    const size_t size = pixels * pass_info(pass).channels;
+    plane.reserve(size);  // page by page, for a stop waits for none of it
+    while (plane.size() < size && !stop_) plane.resize(std::min(size, plane.size() + (1u << 20)));
+    if (stop_) return;
+    film.read(pass, plane.data(), 1, StopToken(&stop_));
   };
   if (layered) {
-    add_layered_guides(film, *images, read);
+    add_layered_guides(film, *images, read, StopToken(&stop_));
   } else {
     read(images->albedo, Pass::kAlbedo);
   }

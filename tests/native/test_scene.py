@@ -12,6 +12,7 @@ import pytest
 
 GREY = {"nodes": [{"type": "diffuse_bsdf", "name": "d", "params": {}, "inputs": {"color": (0.5, 0.5, 0.5)}}],
         "surface": ("link", 0, "shader")}
+ROUNDING = 2.0**-22  # Embree divides by an approximation that processors round each in its own way
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
 TWO = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
@@ -59,7 +60,7 @@ def test_strided_and_other_typed_arrays_are_the_same_mesh(ag) -> None:
         scene.add_instances(square(scene, **variant), at(), name="o")
         assert scene.commit()["warnings"] == []
         hit = down(scene, 0.25, 0.5)
-        assert hit["triangle"][0] == 1 and hit["distance"][0] == 10.0
+        assert hit["triangle"][0] == 1 and abs(hit["distance"][0] - 10.0) <= 10.0 * ROUNDING
 
 
 @pytest.mark.parametrize("side", [1, 400])  # 400: long enough for several threads
@@ -265,7 +266,7 @@ def test_degenerate_and_duplicate_triangles_are_harmless(ag) -> None:
     assert scene.commit()["warnings"] == []
     grid = np.stack(np.meshgrid(np.linspace(0.05, 0.95, 30), np.linspace(0.03, 0.97, 30), [1.0]), -1).reshape(-1, 3)
     hit = scene.intersect(grid, np.tile([0.0, 0.0, -1.0], (len(grid), 1)))
-    assert (hit["distance"] == 1.0).all() and (hit["triangle"] >= 2).all()
+    assert (abs(hit["distance"] - 1.0) <= ROUNDING).all() and (hit["triangle"] >= 2).all()
 
 
 def test_removed_mesh_leaves_its_instances_out(ag) -> None:
