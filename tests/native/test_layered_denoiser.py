@@ -136,7 +136,7 @@ def test_a_stop_is_obeyed() -> None:
     built.set_camera((1600, 1200), 0)
     built.scene.commit()
     taken = []
-    for _ in range(6):
+    for _ in range(3):
         running = afterglow.Session(built.scene, {"width": 1600, "height": 1200, "samples": 1, "max_bounces": 0, **FILTERED})
         running.start()
         while running.progress()["stage"] != "denoising" and running.progress()["state"] == "running":
