@@ -14,12 +14,12 @@ namespace afterglow {
 
 namespace {
 
-constexpr int kPasses =
-    4;  // taps spread by 1, 2, 4 and 8 pixels: whole pictures have more noise than a cache's answers
+/// Taps spread by 1, 2, 4 and 8 pixels: whole pictures have more noise than a cache's answers.
+constexpr int kPasses = 4;
 constexpr float kDarkest = 0.02f;  // of albedo: what is darker is as good as black
 constexpr float kUnknown = 1.0f;   // relative error of a pixel that tells none
-constexpr float kSpread =
-    4.0f;  // of standard errors, in (6): wider ones carry bright strips into what is dark beside them
+/// Of standard errors, in (6): wider ones carry bright strips into what is dark beside them.
+constexpr float kSpread = 4.0f;
 
 Rgb rgb(const float* image, size_t pixel) { return {image[pixel * 3], image[pixel * 3 + 1], image[pixel * 3 + 2]}; }
 
