@@ -98,8 +98,11 @@ PixelNoise Film::noise(size_t pixel) const {
   if (!counts_[pixel]) return {};
   const float* sums = sums_.data() + pixel * size_t(layout_.floats);
   const float* c = sums + layout_[Pass::kCombined];
-  const float seen = keeps_sight() ? luminance(this->seen(sums)) : 0.0f;
-  PixelNoise noise{.sum = luminance(Rgb(c[0], c[1], c[2])) - seen, .seen = seen, .samples = counts_[pixel]};
+  PixelNoise noise{.sum = luminance(Rgb(c[0], c[1], c[2])), .samples = counts_[pixel]};
+  if (keeps_sight()) {
+    noise.sum -= luminance(seen(sums));
+    noise.seen = mean_seen(sight_[pixel], sums, noise.samples) * float(noise.samples);
+  }
   if (keeps_noise()) noise.squares = squares_[pixel], noise.extra = extras_[pixel];
   return noise;
 }

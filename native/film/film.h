@@ -47,7 +47,7 @@ struct PixelRequest {
 /// What a pixel's samples tell of its noise.
 struct PixelNoise {
   float sum = 0.0f, squares = 0.0f;  // of the samples' luminances
-  float seen = 0.0f;                 // light that stands in neither, because rays of its own see to it
+  float seen = 0.0f;                 // light in neither, as rays of its own see to it: all rays' mean for each sample
   uint32_t samples = 0, extra = 0;   // all samples, and those of extra requests among them
 };
 

@@ -11,7 +11,7 @@ namespace afterglow {
 
 namespace {
 
-constexpr uint32_t kMostTimes = 16;  // samples beyond a pixel's own, for each of those
+constexpr uint32_t kMostTimes = 64;  // samples beyond a pixel's own, for each of those
 constexpr int kHalvings = 24;
 
 /// Sums over 3 × 3 pixels with binomial weights.
@@ -21,14 +21,14 @@ struct Near {
 
 }  // namespace
 
-std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, uint32_t width, uint32_t height,
-                                       StopToken stop) {
+std::vector<float> deviations(const std::vector<PixelNoise>& pixels, uint32_t width, uint32_t height,
+                              DeviationUnit unit, StopToken stop) {
   double total = 0.0;
   uint64_t known = 0;
   for (const PixelNoise& p : pixels)
     if (p.samples) total += double(p.sum + p.seen) / p.samples, ++known;
-  std::vector<float> deviations(pixels.size(), 0.0f);
-  if (!known || !(total > 0.0)) return deviations;
+  std::vector<float> found(pixels.size(), 0.0f);
+  if (!known || !(total > 0.0)) return found;
   const float bright = 2.0f * float(total / double(known)), floor = 0.01f * bright * bright;
   const auto look_at_row = [&](int y) {
     for (int x = 0; x < int(width); ++x) {
@@ -48,7 +48,10 @@ std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, ui
       const float mean = near.sum / near.weight, level = near.level / near.weight;
       const float variance =
           near.known > 0.0f ? near.variance / near.known : std::max(0.0f, near.mean_square / near.weight - mean * mean);
-      deviations[size_t(y) * width + size_t(x)] = std::sqrt(variance / (level * level + floor));
+      const float square = unit == DeviationUnit::kLight   ? 1.0f
+                           : unit == DeviationUnit::kShown ? std::sqrt(level * level + floor)
+                                                           : level * level + floor;
+      found[size_t(y) * width + size_t(x)] = std::sqrt(variance / square);
     }
   };
   parallel_blocks(
@@ -57,18 +60,18 @@ std::vector<float> relative_deviations(const std::vector<PixelNoise>& pixels, ui
         for (size_t y = begin; y < end; ++y) look_at_row(int(y));
       },
       stop);
-  return deviations;
+  return found;
 }
 
-std::vector<uint32_t> share_out(const std::vector<float>& deviations, const std::vector<PixelNoise>& pixels,
-                                uint64_t budget, uint32_t most, uint32_t seed) {
+std::vector<uint32_t> share_out(const std::vector<float>& noise, const std::vector<PixelNoise>& pixels, uint64_t budget,
+                                uint32_t most, uint32_t seed) {
   std::vector<uint32_t> counts(pixels.size(), 0);
   float largest = 0.0f;
-  for (float d : deviations) largest = std::max(largest, d);
+  for (float d : noise) largest = std::max(largest, d);
   if (!budget || !(largest > 0.0f)) return counts;
   const auto wanted = [&](size_t p, float scale) {
     const float own = float(pixels[p].samples - pixels[p].extra);
-    return std::clamp(deviations[p] * scale - float(pixels[p].samples), 0.0f,
+    return std::clamp(noise[p] * scale - float(pixels[p].samples), 0.0f,
                       std::max(0.0f, own * float(most) - float(pixels[p].extra)));
   };
   const auto all = [&](float scale) {
@@ -100,8 +103,8 @@ std::vector<PixelRequest> extra_requests(const Film& film, float extra) {
   const double budget = double(extra) * own - done;
   std::vector<PixelRequest> requests;
   if (!(budget >= 1.0)) return requests;
-  const std::vector<float> deviations = relative_deviations(pixels, film.width(), film.height());
-  const std::vector<uint32_t> counts = share_out(deviations, pixels, uint64_t(budget), kMostTimes, uint32_t(own));
+  const std::vector<float> noise = deviations(pixels, film.width(), film.height(), DeviationUnit::kShown);
+  const std::vector<uint32_t> counts = share_out(noise, pixels, uint64_t(budget), kMostTimes, uint32_t(own));
   for (uint32_t y = f.y0; y < f.y1; ++y)
     for (uint32_t x = f.x0; x < f.x1; ++x) {
       const size_t p = size_t(y - f.y0) * film.width() + (x - f.x0);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Where camera samples beyond every pixel's own bring most: edges, gloss and small bright things hold nearly all of the
 // noise that a cache leaves, on a few per cent of the pixels. Samples in proportion to the deviation of a pixel's
-// samples (Neyman 1934) make the relative error of the whole picture smallest. Pure functions.
+// samples (Neyman 1934) make the error of the displayed picture smallest. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,21 @@
 
 namespace afterglow {
 
-/// Deviation of one sample of each pixel, in units of the relative error: sqrt(variance / (mean² + 0.01 · (2 · image
-/// mean)²)). Variances and means are shared by 3 × 3 neighbours; where pixels have one sample, it is the neighbours'
-/// spread that counts. Not to be used once it was stopped.
-std::vector<float> relative_deviations(const std::vector<PixelNoise>&, uint32_t width, uint32_t height,
-                                       StopToken stop = {});
+/// Deviation of one sample of each pixel, in units of
+enum class DeviationUnit {
+  kLight,    // luminance itself
+  kShown,    // the displayed value, whose slope is 1 / √light: light 1 at 1
+  kRelative  // the relative error
+};
+/// Of a mean m kShown divides by (m² + 0.01 · (2 · image mean)²)^(1/4), kRelative by the square of that. Variances and
+/// means are shared by 3 × 3 neighbours; where pixels have one sample, it is the neighbours' spread that counts. Not to
+/// be used once it was stopped.
+std::vector<float> deviations(const std::vector<PixelNoise>&, uint32_t width, uint32_t height, DeviationUnit,
+                              StopToken stop = {});
 
 /// How many samples each pixel gets, `budget` in all at most: those that bring it nearest to a number in proportion to
-/// its deviation. No pixel gets more than `most` for each that it has. `seed` decides what fractions are rounded to.
-std::vector<uint32_t> share_out(const std::vector<float>& deviations, const std::vector<PixelNoise>&, uint64_t budget,
+/// its noise. No pixel gets more than `most` for each that it has. `seed` decides what fractions are rounded to.
+std::vector<uint32_t> share_out(const std::vector<float>& noise, const std::vector<PixelNoise>&, uint64_t budget,
                                 uint32_t most, uint32_t seed);
 
 /// Requests for the film's noisy pixels, so that its extra samples are `extra` times its others.

@@ -11,6 +11,7 @@
 #include "film/denoise_task.h"
 #include "render/extra_samples.h"
 #include "render/session.h"
+#include "render/sight.h"
 
 namespace afterglow {
 
@@ -21,6 +22,8 @@ double now() { return std::chrono::duration<double>(std::chrono::steady_clock::n
 /// Pictures of a cache are smooth but for direct light: their first one may take three times as long and be finer.
 constexpr double kFinerStart = 1.0 / 3.0;
 
+/// Of a first pass: what one sample a pixel tells of noise is little, and half of the extra ones tell more.
+constexpr int kExtraRounds = 2;
 /// A viewport's first picture does not wait for rays that only look.
 constexpr uint32_t kLooksFrom = 2;
 /// In which a first picture reaches the screen before all cores are busy with what comes after it.
@@ -60,7 +63,7 @@ void add_layered_guides(const Film& film, DenoiseImages& images, const Read& rea
     images.seen[i] += images.surface[i / 3 * kSurfaceFloats + kSurfaceMirrored + i % 3] * film.settings().exposure;
   const std::vector<PixelNoise> noise = noise_of(film);
   if (stop.stop()) return;
-  images.error = relative_deviations(noise, film.width(), film.height(), stop);
+  images.error = deviations(noise, film.width(), film.height(), DeviationUnit::kRelative, stop);
   for (size_t p = 0; p < noise.size(); ++p) images.error[p] /= std::sqrt(float(std::max(1u, noise[p].samples)));
 }
 
@@ -161,12 +164,14 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     const bool looks = film.keeps_sight() && plan.step == 1 && !film.asks() &&
                        done >= std::max(1u, 2 * film.looked()) && (!settings.viewport || done >= kLooksFrom);
     double looking = now();
-    if (looks) renderer.look(*scene_, film, done, work);
+    if (looks) renderer.look(*scene_, film, done, settings.viewport ? kSightEachInViewport : kSightEach, work);
     looking = now() - looking;
     if (stop_) break;
     if (renderer.extra() > 0.0f && plan.step == 1) {
       work.extra = true;
-      renderer.render(*scene_, extra_requests(film, renderer.extra()), film, work);
+      const int rounds = settings.viewport || index ? 1 : kExtraRounds;
+      for (int i = 1; i <= rounds && !stop_; ++i)
+        renderer.render(*scene_, extra_requests(film, renderer.extra() * float(i) / float(rounds)), film, work);
       work.extra = false;
       if (stop_) break;
     }
@@ -192,7 +197,8 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     const bool last =
         !plan_pass(options, index + 1, done).count && !(carries && settings.viewport && film.rest_waits());
     if (carries && settings.viewport && plan.step == 1 && (done <= 1 || last || now() - at_last_publish > 0.05))
-      film.smooth(relative_deviations(noise_of(film), film.width(), film.height()), settings.threads, work.stop);
+      film.smooth(deviations(noise_of(film), film.width(), film.height(), DeviationUnit::kRelative), settings.threads,
+                  work.stop);
     if (settings.viewport) {
       const bool filter_now = settings.denoise && plan.step == 1 && (std::has_single_bit(done) || last);
       if (filter_now) {
@@ -217,7 +223,8 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
   }
   if (!stop_ && settings.denoise && done && !settings.viewport) publish(settings, film, 1, true);
   if (!stop_ && carries && !settings.viewport && !this->shown())  // noise that is smoothed denoises worse
-    film.smooth(relative_deviations(noise_of(film), film.width(), film.height()), settings.threads, work.stop);
+    film.smooth(deviations(noise_of(film), film.width(), film.height(), DeviationUnit::kRelative), settings.threads,
+                work.stop);
   if (!stop_ && settings.viewport && !shown_filtered && done) publish(settings, film, 1, false);
   return done;
 }
@@ -280,6 +287,8 @@ bool Session::filter(const RenderSettings& settings, const Film& film, Image& im
     warn(std::string("not denoised: ") + reason.what());
     return false;
   }
+  if (!layered && film.keeps_sight() && film.keeps_noise())
+    keep_edges(film, noise_of(film), image.rgba.data(), images->color.data());
   for (size_t p = 0; p < pixels; ++p)
     for (size_t c = 0; c < 3; ++c) image.rgba[p * 4 + c] = std::fmax(0.0f, images->color[p * 3 + c]);
   const std::lock_guard lock(mutex_);

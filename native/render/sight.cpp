@@ -7,30 +7,48 @@
 #include <mutex>
 
 #include "base/parallel.h"
-#include "methods/path_tracing/film_visitor.h"
 #include "methods/path_tracing/kernel_body.h"
+#include "render/extra_samples.h"
 
 namespace afterglow {
 
 namespace {
 
-constexpr float kContrast = 0.02f;  // of light met, over what is shown
-constexpr float kFloor = 0.05f;     // of the image's mean, which counts as shown everywhere
-constexpr uint32_t kMostWanted = 1024;
-constexpr uint64_t kMostPerPixel = 8;  // on the average over the film
+constexpr float kContrast = 0.02f;     // of light met, over what is shown
+constexpr float kFullContrast = 2.0f;  // of an edge that gets all rays
+constexpr float kFloor = 0.05f;        // of the image's mean, which counts as shown everywhere
+constexpr uint32_t kFewest = 16, kMostWanted = 1024;
+constexpr float kErrors = 2.0f;  // standard ones, that a denoiser may be off
 constexpr uint32_t kSeed = 0x51647u;
 
 struct Met {
   float light = 0.0f, shown = -1.0f;  // luminances; shown below 0: no sample yet
 };
 
+/// Sums what camera rays meet at emitters and in the sky.
+struct LookVisitor {
+  using OnlyLooks = void;
+  const path_tracing::KernelInput& in;
+  RayCounts& counts;
+  Rgb emission{0.0f}, environment{0.0f};
+
+  void emitted(const PathState& path, const Rgb& light) { add(emission, path, light); }
+  void escaped(const PathState& path, const Rgb& light) { add(environment, path, light); }
+  void add(Rgb& to, const PathState& path, const Rgb& light) {
+    to += path_tracing::kept(path.throughput * light, in.clamp_direct, counts);
+  }
+  void traced(const Ray&, bool) {}
+  void held_out(const PathState&, float) {}
+  bool surface(const PathState&, const SurfacePoint&, const Surface&) { return true; }
+  void lit(const PathState&, const BsdfValue&, const Rgb&) {}
+  void scattered(const PathState&, const BsdfSample&) {}
+};
+
 template <uint32_t kFeatures>
 void look_at(const path_tracing::KernelInput& in, const PixelRequest& request, RayCounts& counts) {
   const Walker<kFeatures & 7u> walker(in.walk, counts);
-  path_tracing::FilmVisitor<true> visitor(in, counts);
-  const FilmLayout& layout = in.film.layout();
+  LookVisitor visitor{in, counts};
   const uint32_t seed = hash(request.x, request.y, in.seed ^ kSeed);
-  visitor.begin_pixel();
   for (uint32_t i = request.first; i < request.first + request.count; ++i) {
     Sampler sampler(seed, i);
     const Vec2 in_pixel = in.film.filter().offset(sampler.next2());
@@ -39,58 +57,60 @@ void look_at(const path_tracing::KernelInput& in, const PixelRequest& request, R
     PathState path = path_tracing::path_from(in.camera, middle + in_pixel, on_lens, false);
     path.ray.mask = kVisibleCamera;
     path.last = true;  // it goes through what is transparent and no further
-    visitor.begin_sample(path, 0);
     walker.walk(path, sampler, visitor);
   }
-  const auto sum = [&](Pass pass) {
-    const float* from = visitor.sums() + layout[pass];
-    return Rgb(from[0], from[1], from[2]);
-  };
-  in.film.see(request.x, request.y, sum(Pass::kEmission), sum(Pass::kEnvironment), request.count);
+  in.film.see(request.x, request.y, visitor.emission, visitor.environment, request.count);
 }
 
 }  // namespace
 
-uint32_t sight_wanted(uint32_t samples) {
-  return std::min(16u * (std::bit_floor(std::min(samples, kMostWanted)) + 1u), kMostWanted);
+uint32_t sight_wanted(uint32_t samples, uint32_t each) {
+  return std::min(each * (std::bit_floor(std::min(samples, kMostWanted)) + 1u), kMostWanted);
 }
 
-std::vector<PixelRequest> sight_requests(const Film& film, uint32_t wanted) {
+std::vector<PixelRequest> sight_requests(const Film& film, uint32_t wanted, int near, uint64_t most) {
   const FilmSettings& f = film.settings();
   const int width = int(film.width()), height = int(film.height());
   std::vector<Met> met(size_t(width) * size_t(height));
-  double total = 0.0;
-  for (size_t p = 0; p < met.size(); ++p) {
-    const PixelNoise n = film.noise(p);
-    if (!n.samples) continue;
-    met[p] = {n.seen / float(n.samples), (n.sum + n.seen) / float(n.samples)};
-    total += met[p].shown;
-  }
-  const float floor = kFloor * float(total / double(std::max<size_t>(met.size(), 1)));
-  std::vector<PixelRequest> requests;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      float least = kInfinity, most = 0.0f, shown = 0.0f;
-      int neighbours = 0;
-      for (int j = std::max(0, y - 1); j <= std::min(height - 1, y + 1); ++j)
-        for (int i = std::max(0, x - 1); i <= std::min(width - 1, x + 1); ++i) {
-          const Met& m = met[size_t(j) * size_t(width) + size_t(i)];
-          if ((i == x && j == y) || m.shown < 0.0f) continue;
-          least = std::min(least, m.light), most = std::max(most, m.light);
-          shown += m.shown, ++neighbours;
-        }
-      if (!neighbours || !(most - least > kContrast * (shown / float(neighbours) + floor))) continue;
-      const size_t p = size_t(y) * size_t(width) + size_t(x);
-      const uint32_t have = film.sight_samples(p);
-      if (have < wanted / 2)
-        requests.push_back({.x = uint16_t(f.x0 + uint32_t(x)),
-                            .y = uint16_t(f.y0 + uint32_t(y)),
-                            .first = have,
-                            .count = wanted - have});
+  parallel_blocks(met.size(), 16384, [&](size_t begin, size_t end) {
+    for (size_t p = begin; p < end; ++p) {
+      const PixelNoise n = film.noise(p);
+      if (n.samples) met[p] = {n.seen / float(n.samples), (n.sum + n.seen) / float(n.samples)};
     }
+  });
+  double total = 0.0;
+  for (const Met& m : met) total += std::max(0.0f, m.shown);
+  const float floor = kFloor * float(total / double(std::max<size_t>(met.size(), 1)));
+  const auto enough_at = [&](int x, int y) {
+    float least = kInfinity, brightest = 0.0f, shown = 0.0f;
+    int neighbours = 0;
+    for (int j = std::max(0, y - near); j <= std::min(height - 1, y + near); ++j)
+      for (int i = std::max(0, x - near); i <= std::min(width - 1, x + near); ++i) {
+        const Met& m = met[size_t(j) * size_t(width) + size_t(i)];
+        if ((i == x && j == y) || m.shown < 0.0f) continue;
+        least = std::min(least, m.light), brightest = std::max(brightest, m.light);
+        shown += m.shown, ++neighbours;
+      }
+    const float contrast = (brightest - least) / (shown / float(std::max(neighbours, 1)) + floor);
+    if (!(contrast > kContrast)) return 0u;
+    return std::max(std::min(wanted, kFewest), uint32_t(float(wanted) * std::min(1.0f, contrast / kFullContrast)));
+  };
+  std::vector<uint32_t> enough(met.size());
+  parallel_blocks(size_t(height), 8, [&](size_t begin, size_t end) {
+    for (size_t y = begin; y < end; ++y)
+      for (int x = 0; x < width; ++x) enough[y * size_t(width) + size_t(x)] = enough_at(x, int(y));
+  });
+  std::vector<PixelRequest> requests;
+  for (size_t p = 0; p < met.size(); ++p) {
+    const uint32_t have = film.sight_samples(p);
+    if (have >= enough[p] / 2) continue;
+    requests.push_back({.x = uint16_t(f.x0 + p % size_t(width)),
+                        .y = uint16_t(f.y0 + p / size_t(width)),
+                        .first = have,
+                        .count = enough[p] - have});
+  }
   uint64_t rays = 0;
   for (const PixelRequest& r : requests) rays += r.count;
-  const uint64_t most = kMostPerPixel * met.size();
   for (PixelRequest& r : requests)
     if (rays > most) r.count = std::max(1u, uint32_t(uint64_t(r.count) * most / rays));
   return requests;
@@ -118,6 +138,18 @@ void look(const CommittedScene& scene, std::span<const PixelRequest> requests, F
         counts += own;
       },
       work.stop);
+}
+
+void keep_edges(const Film& film, const std::vector<PixelNoise>& noise, const float* shown, float* denoised) {
+  const std::vector<float> spread = deviations(noise, film.width(), film.height(), DeviationUnit::kLight);
+  for (size_t p = 0; p < noise.size(); ++p) {
+    if (!film.sight_samples(p) || !noise[p].samples) continue;
+    const float limit = kErrors * film.settings().exposure * spread[p] / std::sqrt(float(noise[p].samples));
+    float off = 0.0f;
+    for (size_t c = 0; c < 3; ++c) off = std::max(off, std::fabs(denoised[p * 3 + c] - shown[p * 4 + c]));
+    if (!(off > limit)) continue;
+    for (size_t c = 0; c < 3; ++c) denoised[p * 3 + c] = glm::mix(shown[p * 4 + c], denoised[p * 3 + c], limit / off);
+  }
 }
 
 }  // namespace afterglow

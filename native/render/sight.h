@@ -2,8 +2,9 @@
 // Edges of what shines: a pixel that a bright window half fills is the noisiest of all, and what it lacks is not light
 // but one ray a sample, which ends at the first surface. Where neighbouring pixels see different light at emitters and
 // in the sky, rays of their own tell its mean, and samples with all their shadow rays tell the rest (splitting, Arvo
-// and Kirk 1990). A pixel's own samples have no say in whether it
-// gets such rays, so that no mean falls or rises.
+// and Kirk 1990). A pixel's own samples have no say in whether it gets such rays, so that no mean falls or rises; what
+// rays saw at its neighbours has: a bar thinner than a pixel, which one sample in five meets, is found along its
+// length.
 #pragma once
 
 #include <span>
@@ -14,15 +15,30 @@
 
 namespace afterglow {
 
-/// How many rays see to an edge when every pixel has `samples` samples; grows as they double.
-uint32_t sight_wanted(uint32_t samples);
+/// How many rays see to an edge when every pixel has `samples` samples, so many for each of these; grows as they
+/// double.
+uint32_t sight_wanted(uint32_t samples, uint32_t each);
+inline constexpr uint32_t kSightEach = 64, kSightEachInViewport = 16;
 
-/// Requests for pixels whose eight neighbours met light that differs by more than two per cent of what they show, and
-/// that have less than half of the `wanted` rays: so many that they have all, or that there are eight for each pixel of
-/// the film.
-std::vector<PixelRequest> sight_requests(const Film&, uint32_t wanted);
+/// Requests for pixels around which, no farther than `near` pixels, light was met that differs by more than two per
+/// cent of what they show, and that have less than half of the `wanted` rays: so many that they have all, or `most` in
+/// all.
+std::vector<PixelRequest> sight_requests(const Film&, uint32_t wanted, int near, uint64_t most);
+
+/// A few rays find the edges, those that samples missed, too; then all look at what is next to one.
+struct SightRound {
+  uint32_t wanted;  // rays, at most
+  int near;         // pixels
+};
+inline constexpr SightRound kSightRounds[] = {{16, 2}, {16, 2}, {16, 2}, {16, 2}, {1024, 1}};
+inline constexpr uint64_t kSightMost = 8;  // rays in all, for each pixel of the film
 
 /// Traces the requests' rays. What they meet joins the film by see().
 void look(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&, const WalkSettings&, RayCounts&);
+
+/// A library knows nothing of how well a pixel is known, and draws a thin bar before a window anew. Where rays looked,
+/// it goes no farther from `shown` (RGBA) than two standard errors of all other light. noise: film.noise() of all
+/// pixels.
+void keep_edges(const Film&, const std::vector<PixelNoise>& noise, const float* shown, float* denoised);
 
 }  // namespace afterglow

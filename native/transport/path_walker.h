@@ -88,6 +88,12 @@ inline constexpr bool kIgnores = requires {
   requires Visitor::kIgnoresSurfaces;
 };
 
+/// Wants nothing but emitters and the sky: the walk ends at what is neither one nor lets anything through.
+template <class Visitor>
+inline constexpr bool kOnlyLooks = requires {
+  typename Visitor::OnlyLooks;
+};
+
 template <uint32_t kFeatures>
 class Walker {
   static constexpr bool kLobes = kFeatures & kFeatureLobes;
@@ -128,6 +134,10 @@ class Walker {
       if constexpr (!kKnown) {
         path.context.ray_length = hit.t;
         path.context.footprint += path.pixel_angle * hit.t;
+      }
+      if constexpr (kOnlyLooks<Visitor>) {
+        if (!(scene_.materials.material_effects(material_at(scene_.scene, hit)) & (kEmissiveMesh | kTransparency)))
+          return;
       }
       SurfacePoint point = lean ? surface_point(scene_.scene, path.ray, hit, false) : point_at(path, hit);
       Room room;  // of nothing, until a surface is made there

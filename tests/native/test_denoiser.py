@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from afterglow import _native, metrics, scenes
 from afterglow.scenes.native import Built
-from hard_cases import ball_under_sky
+from hard_cases import ball_under_sky, render
+from test_sight import bars
 
 SIZE = 72
 GUIDES = ("combined", "albedo", "denoise_normal")
@@ -123,6 +124,16 @@ def test_wrong_input_is_refused(copies: list[str]) -> None:
             afterglow.denoise(*arguments, search=copies)
     with pytest.raises(afterglow.InvalidInput, match="nobody"):
         afterglow.denoise(image, denoiser="nobody", search=copies)
+
+
+def test_no_edge_is_drawn_anew_that_rays_have_seen(copies: list[str]) -> None:
+    """Bars before a bright window at one sample: rays that only look know them, and the library would blur them."""
+    settings: dict[str, object] = dict(method="HASH_CACHE", size=48, samples=1, seed=3, denoiser_search=copies)
+    truth = render(bars(), method="HASH_CACHE", size=48, samples=256).image[..., :3]
+    noisy, clean = (render(bars(), denoise=on, **settings).image[..., :3] for on in (False, True))
+    edge = np.abs(np.gradient(truth[..., 0], axis=1)) > 1.0
+    before, after = (np.sqrt(np.mean((picture - truth)[edge] ** 2)) for picture in (noisy, clean))
+    assert after < 1.1 * before
 
 
 def session(built: Built, copies: list[str], width: int, height: int, **settings: object) -> afterglow.Session:

@@ -127,3 +127,14 @@ def test_after_an_edit_nothing_is_left_of_what_was_seen() -> None:
     session.wait()
     after = session.read("emission")
     assert after[..., 0].max() < 1e-3 and 0.9 < after[..., 2].max() < 1.01
+
+
+def test_a_bar_thinner_than_a_pixel_is_found() -> None:
+    """One sample in eight meets it; what rays saw at its neighbours leads on along it, so that no part of it is missing."""
+    scene = bars(0.03)
+    scene.objects = [o for o in scene.objects if o.name != "Bars"]
+    scene.add("Cord", quad((0, 0, -1.5), (0.02, 0, -1.5), (0.05, 0, 1.5), (0.03, 0, 1.5)), "bar")
+    truth = pictures(scene, 1, "emission", samples=1024, sight=False)[0]
+    window = truth[..., 0] > 0.5 * truth[..., 0].max()
+    worst = [np.abs(picture - truth)[window].max() for picture in pictures(scene, 6, "emission", samples=1)]
+    assert np.mean(worst) < 0.3 * truth.max(), worst

@@ -13,6 +13,16 @@ namespace afterglow::path_tracing {
 /// 32-bit floats, and no light that means something is near. What is above is dropped and counted.
 inline constexpr float kMostLight = 1e30f;
 
+/// Clamped, within bounds and not negative; what is dropped is counted.
+inline Rgb kept(const Rgb& light, float limit, RayCounts& counts) {
+  const float sum = std::fabs(light.x) + std::fabs(light.y) + std::fabs(light.z);
+  if (!(sum <= kMostLight)) {
+    counts.dropped++;
+    return Rgb(0.0f);
+  }
+  return glm::max(sum > limit ? light * (limit / sum) : light, Rgb(0.0f));
+}
+
 template <bool kPasses, bool kLobes = true>
 class FilmVisitor {
  public:
@@ -147,16 +157,10 @@ class FilmVisitor {
     return light_;
   }
 
-  /// Clamped, within bounds and not negative; what is dropped is counted.
   Rgb kept(const Rgb& light, bool direct) {
     const float sum = std::fabs(light.x) + std::fabs(light.y) + std::fabs(light.z);
     if (sum <= least_limit_) return glm::max(light, Rgb(0.0f));
-    if (!(sum <= kMostLight)) {
-      counts_.dropped++;
-      return Rgb(0.0f);
-    }
-    const float limit = direct ? in_.clamp_direct : in_.clamp_indirect;
-    return glm::max(sum > limit ? light * (limit / sum) : light, Rgb(0.0f));
+    return path_tracing::kept(light, direct ? in_.clamp_direct : in_.clamp_indirect, counts_);
   }
 
   void add(Pass pass, const Rgb& value) {
