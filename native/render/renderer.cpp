@@ -46,12 +46,12 @@ void Renderer::render(const CommittedScene& scene, std::span<const PixelRequest>
   render_wavefronts(*method_, scene, requests, film, work, settings_, times_, wave_);
 }
 
-void Renderer::look(const CommittedScene& scene, Film& film, uint32_t samples, uint32_t each, Work& work) {
+void Renderer::look(const CommittedScene& scene, Film& film, uint32_t samples, uint32_t least, Work& work) {
   const auto begun = std::chrono::steady_clock::now();
   uint64_t left = kSightMost * film.width() * film.height();
   for (const SightRound& round : kSightRounds) {
     if (!left || work.stop.stop()) break;
-    const uint32_t wanted = std::min(round.wanted, sight_wanted(samples, each));
+    const uint32_t wanted = std::min(round.wanted, sight_wanted(samples, least));
     const std::vector<PixelRequest> requests = sight_requests(film, wanted, round.near, left);
     afterglow::look(scene, requests, film, work, settings_, times_.counts);
     for (const PixelRequest& r : requests) times_.looks += r.count, left -= std::min<uint64_t>(left, r.count);

@@ -42,8 +42,8 @@ class Renderer {
   bool refine(const CommittedScene& scene, Work& work) { return method_->refine(scene, work); }
   void render(const CommittedScene&, std::span<const PixelRequest>, Film&, Work&);
   /// Rays that only look, for the film's edges of what shines: see sight.h. `samples`: that every pixel has;
-  /// `each`: rays for each of these.
-  void look(const CommittedScene&, Film&, uint32_t samples, uint32_t each, Work&);
+  /// `least`: rays at an edge.
+  void look(const CommittedScene&, Film&, uint32_t samples, uint32_t least, Work&);
   MethodStatistics statistics() const;
   /// What the method remembers, into and out of a file. Throw FileError, and InvalidInput where there is nothing to
   /// save or the file belongs to another scene.

@@ -164,7 +164,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     const bool looks = film.keeps_sight() && plan.step == 1 && !film.asks() &&
                        done >= std::max(1u, 2 * film.looked()) && (!settings.viewport || done >= kLooksFrom);
     double looking = now();
-    if (looks) renderer.look(*scene_, film, done, settings.viewport ? kSightEachInViewport : kSightEach, work);
+    if (looks) renderer.look(*scene_, film, done, settings.viewport ? kLeastSightInViewport : kLeastSight, work);
     looking = now() - looking;
     if (stop_) break;
     if (renderer.extra() > 0.0f && plan.step == 1) {

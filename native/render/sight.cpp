@@ -64,8 +64,8 @@ void look_at(const path_tracing::KernelInput& in, const PixelRequest& request, R
 
 }  // namespace
 
-uint32_t sight_wanted(uint32_t samples, uint32_t each) {
-  return std::min(each * (std::bit_floor(std::min(samples, kMostWanted)) + 1u), kMostWanted);
+uint32_t sight_wanted(uint32_t samples, uint32_t least) {
+  return std::clamp(16u * (std::bit_floor(std::min(samples, kMostWanted)) + 1u), least, kMostWanted);
 }
 
 std::vector<PixelRequest> sight_requests(const Film& film, uint32_t wanted, int near, uint64_t most) {

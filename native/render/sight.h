@@ -15,10 +15,9 @@
 
 namespace afterglow {
 
-/// How many rays see to an edge when every pixel has `samples` samples, so many for each of these; grows as they
-/// double.
-uint32_t sight_wanted(uint32_t samples, uint32_t each);
-inline constexpr uint32_t kSightEach = 64, kSightEachInViewport = 16;
+/// How many rays see to an edge when every pixel has `samples` samples: `least`, or 16 for each, growing as they double.
+uint32_t sight_wanted(uint32_t samples, uint32_t least);
+inline constexpr uint32_t kLeastSight = 128, kLeastSightInViewport = 32;
 
 /// Requests for pixels around which, no farther than `near` pixels, light was met that differs by more than two per
 /// cent of what they show, and that have less than half of the `wanted` rays: so many that they have all, or `most` in
