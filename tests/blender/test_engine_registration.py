@@ -117,7 +117,7 @@ def test_a_click_prepares_an_animation(in_blender: Run) -> None:
         result(objects=[own.method, own.accuracy, cache.virtual_lights, cache.light_compensation, cache.cache_first])
         """
     )
-    assert found["camera"] == ["HASH_CACHE", 1, 6.0, True, 7]
+    assert found["camera"] == ["HASH_CACHE", 1, 3.0, True, 7]
     assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 32, 16]
 
 

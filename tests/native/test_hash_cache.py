@@ -181,6 +181,18 @@ def test_the_first_picture_of_an_empty_cache_takes_its_samples() -> None:
     assert Live(cornell_box(), samples=1, hash_first=5, viewport=True).session.statistics()["samples"] == 1
 
 
+def test_all_of_the_first_picture_fills_the_cache_and_a_share_of_what_follows() -> None:
+    def paths(**settings: Any) -> list[float]:
+        live = Live(cornell_box(), samples=4, hash_extra=0.0, hash_running=False, **settings)
+        found = [live.session.statistics()["values"]["cache_paths"]]
+        live.look_from((0.1, -3.9, 1), (0, 0, 1))
+        return [*found, live.session.statistics()["values"]["cache_paths"] - found[0]]
+
+    full, few, first = paths(), paths(hash_resolution=0.25), paths(hash_resolution=0.25, hash_first=1)
+    assert few[0] < 0.2 * full[0] and first[0] == full[0]
+    assert first[1] < 0.2 * full[1]
+
+
 def test_the_picture_of_a_still_view_goes_on() -> None:
     still = Live(cornell_box(), hash_running=True)
 

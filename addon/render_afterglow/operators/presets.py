@@ -17,7 +17,7 @@ QUALITIES = {
     # Animations whose caches live from frame to frame: as the bench's figures `frames` have them.
     "CAMERA": dict(
         method="HASH_CACHE", accuracy=0.0, samples=1, denoise=True, use_animated_seed=True,
-        hash_cache=dict(hash_extra=6.0, hash_resolution=0.5, hash_first=4),
+        hash_cache=dict(hash_extra=3.0, hash_resolution=0.35, hash_first=4),
     ),
     "OBJECTS": dict(
         method="INSTANT_CACHE", accuracy=0.0, samples=4, denoise=True, use_animated_seed=True,

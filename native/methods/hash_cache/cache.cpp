@@ -180,7 +180,7 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   }
   const WalkScene walk = walk_scene(scene);
   // Cells that are there already get paths more rarely the more they hold; points without one are asked for holes.
-  const float resolution = work.extra ? 0.0f : settings_.resolution * work.caching;
+  const float resolution = work.extra ? 0.0f : (all_ask_ ? 1.0f : settings_.resolution) * work.caching;
   // The first few paths fill cells in which the others end; where few are sent, filling cells thrice costs more. What
   // is left has no path; its own cell may be empty.
   const bool at_once = work.caching < 1.0f;

@@ -32,6 +32,8 @@ struct CacheCounts {
 class Cache {
  public:
   void configure(const CacheSettings&);
+  /// Whether every question sends a path, whatever the resolution: in the picture that all further ones begin with.
+  void let_all_ask(bool all) { all_ask_ = all; }
   /// After edits: some paths are walked again, and cells keep what these say that still holds; or starts anew.
   void update(const CommittedScene&, const SceneChanges&, Work&);
   /// One path from each chosen point, and from each that no cell could answer.
@@ -76,6 +78,7 @@ class Cache {
   bool trace(const WalkScene&, std::span<const CachePoint>, std::span<const uint32_t> chosen, Work&);
 
   CacheSettings settings_;
+  bool all_ask_ = false;
   bool stale_ = true;
   Grid grid_;
   Table table_;

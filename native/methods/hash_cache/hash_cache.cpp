@@ -67,6 +67,7 @@ class HashCache final : public IndirectMethod {
 
   void update(const CommittedScene& scene, const SceneChanges& changes, Work& work) override {
     cold_ = cache_.table().size() == 0;
+    cache_.let_all_ask(cold_ && first_);
     cache_.update(scene, changes, work);
   }
   bool refine(const CommittedScene&, Work&) override { return false; }
@@ -148,7 +149,9 @@ MethodDescription describe() {
       "gloss",
       "", double(kExtra), 0.0, 16.0);
   add("hash_first", "First Samples",
-      "Samples that the first picture of an empty cache takes at least: what it leaves, all that follow begin with", "",
+      "Samples that the first picture of an empty cache takes at least, at full caching resolution: what it leaves, all "
+      "that follow begin with",
+      "",
       int64_t(0), 0.0, 65536.0);
   add("hash_resolution", "Caching Resolution",
       "Paths that fill the cache, as a share of the image's width and height; what no cell answers is filled anyway",
