@@ -15,7 +15,8 @@
 
 namespace afterglow {
 
-/// How many rays see to an edge when every pixel has `samples` samples: `least`, or 16 for each, growing as they double.
+/// How many rays see to an edge when every pixel has `samples` samples: `least`, or 16 for each, growing as they
+/// double.
 uint32_t sight_wanted(uint32_t samples, uint32_t least);
 inline constexpr uint32_t kLeastSight = 128, kLeastSightInViewport = 32;
 
