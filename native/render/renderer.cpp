@@ -49,13 +49,17 @@ void Renderer::render(const CommittedScene& scene, std::span<const PixelRequest>
 void Renderer::look(const CommittedScene& scene, Film& film, uint32_t samples, uint32_t least, Work& work) {
   const auto begun = std::chrono::steady_clock::now();
   uint64_t left = kSightMost * film.width() * film.height();
-  for (const SightRound& round : kSightRounds) {
-    if (!left || work.stop.stop()) break;
-    const uint32_t wanted = std::min(round.wanted, sight_wanted(samples, least));
-    const std::vector<PixelRequest> requests = sight_requests(film, wanted, round.near, left);
+  const auto more = [&](uint32_t wanted, int near) {
+    if (!left || work.stop.stop()) return false;
+    const std::vector<PixelRequest> requests = sight_requests(film, wanted, near, left);
     afterglow::look(scene, requests, film, work, settings_, times_.counts);
     for (const PixelRequest& r : requests) times_.looks += r.count, left -= std::min<uint64_t>(left, r.count);
-  }
+    return !requests.empty();
+  };
+  const uint32_t wanted = sight_wanted(samples, least);
+  int rounds = 0;
+  while (rounds < kFindingRounds && more(std::min(kFindingRays, wanted), kFindingNear)) rounds++;
+  if (rounds || film.looked()) more(wanted, 1);
   times_.look += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   film.set_looked(samples);
 }

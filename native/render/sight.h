@@ -25,12 +25,9 @@ inline constexpr uint32_t kLeastSight = 128, kLeastSightInViewport = 32;
 /// all.
 std::vector<PixelRequest> sight_requests(const Film&, uint32_t wanted, int near, uint64_t most);
 
-/// A few rays find the edges, those that samples missed, too; then all look at what is next to one.
-struct SightRound {
-  uint32_t wanted;  // rays, at most
-  int near;         // pixels
-};
-inline constexpr SightRound kSightRounds[] = {{16, 2}, {16, 2}, {16, 2}, {16, 2}, {1024, 1}};
+/// A few rays find the edges, those that samples missed, too, in some rounds; then more look at what is next to one.
+inline constexpr int kFindingRounds = 4, kFindingNear = 2;
+inline constexpr uint32_t kFindingRays = 16;
 inline constexpr uint64_t kSightMost = 8;  // rays in all, for each pixel of the film
 
 /// Traces the requests' rays. What they meet joins the film by see().
