@@ -2,8 +2,8 @@
 // Edges of what shines: a pixel that a bright window half fills is the noisiest of all, and what it lacks is not light
 // but one ray a sample, which ends at the first surface. Where neighbouring pixels see different light at emitters and
 // in the sky, rays of their own tell its mean, and samples with all their shadow rays tell the rest (splitting, Arvo
-// and Kirk 1990). A pixel's own samples have no say in whether it gets such rays, so that no mean falls or rises; what
-// rays saw at its neighbours has: a bar thinner than a pixel, which one sample in five meets, is found along its
+// and Kirk 1990). Whether a pixel gets such rays is never for its own samples to say; what
+// rays saw at its neighbours does: a bar thinner than a pixel, which one sample in five meets, is found along its
 // length.
 #pragma once
 
