@@ -121,6 +121,30 @@ def test_a_click_prepares_an_animation(in_blender: Run) -> None:
     assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 32, 16]
 
 
+def test_viewports_better_the_lights_of_a_cache(in_blender: Run) -> None:
+    """Renders take settings as they are, and so do viewports without short rays."""
+    found = in_blender(
+        """
+        s = bpy.context.scene
+        s.render.engine = 'AFTERGLOW'
+        own = s.afterglow
+        own.method = 'INSTANT_CACHE'
+        asked = addon('properties.scene').session_settings
+        names = 'virtual_lights', 'light_compensation', 'light_bound'
+        told = lambda viewport: [asked(s, viewport)[name] for name in names]
+        result(render=told(False), viewport=told(True))
+        own.instant_cache.virtual_lights = 65536
+        result(most=told(True))
+        own.preview_short_rays = 0
+        own.instant_cache.virtual_lights = 256
+        result(without=told(True))
+        """
+    )
+    assert found["render"] == found["without"] == [256, 0, 2.0]
+    assert found["viewport"] == [320, 16, 4.0]
+    assert found["most"] == [65536, 16, 4.0]
+
+
 def test_an_active_virtual_environment_is_no_obstacle(in_blender: Run, tmp_path: Path) -> None:
     """Debian's Blender takes the first python3 on PATH for its own, and one of a virtual environment has no numpy."""
     subprocess.run(["/usr/bin/python3", "-m", "venv", "--without-pip", str(tmp_path / "venv")], check=True)

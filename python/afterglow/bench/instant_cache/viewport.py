@@ -15,7 +15,7 @@ from ..foundation.kitchen import PERCENT, scene
 from ..foundation.viewport import Watched, first_image, watch
 
 CACHED = ("method=INSTANT_CACHE",)
-AS_VIEWPORT = {"light_compensation": 16, "light_bound": 4.0}  # what the add-on's viewports add to the method's settings
+AS_VIEWPORT = {"light_compensation": 16, "light_bound": 4.0, "virtual_lights": 320}  # what the add-on makes of its defaults
 SETTLED = 24  # samples a pixel: about as many as the window has when it is looked at last
 RESTS = 0.005  # mean difference of display values to the settled image
 
