@@ -157,4 +157,17 @@ class Film {
   mutable std::vector<std::atomic_flag> locks_;
 };
 
+/// The lock of the strip that a pixel lies in.
+class Film::Lock {
+ public:
+  Lock(const Film& film, size_t pixel) : flag_(film.locks_[pixel / 32]) {
+    while (flag_.test_and_set(std::memory_order_acquire)) {
+    }
+  }
+  ~Lock() { flag_.clear(std::memory_order_release); }
+
+ private:
+  std::atomic_flag& flag_;
+};
+
 }  // namespace afterglow

@@ -19,8 +19,8 @@ DIFFERENCE = ("cornell_statue", "wobbling_cylinder", "desk_with_chair", "bunnies
 SMALL = {"width": 300, "height": 200, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 1.5, "caustics_reflective": False,
          "caustics_refractive": False}
 REFERENCE_SAMPLES = 512
-# accuracy of the cache, virtual lights, samples a pixel, short rays
-LEVELS = {"default": (0.05, 256, 16, 0), "finer": (0.025, 2048, 32, 16), "finest": (0.0125, 16384, 64, 32)}
+# accuracy of the cache, virtual lights, samples a pixel, short rays, bound
+LEVELS = {"default": (0.05, 256, 16, 0, 2.0), "finer": (0.025, 2048, 64, 16, 4.0), "finest": (0.0125, 16384, 256, 64, 4.0)}
 
 
 def picture(watched: Watched) -> NDArray[np.float32]:
@@ -87,10 +87,10 @@ def error(context: Context) -> list[Figure]:
     for name in DIFFERENCE:
         truth, _ = reference(name)
         found = {}
-        for level, (accuracy, lights, samples, short) in LEVELS.items():
+        for level, (accuracy, lights, samples, short, bound) in LEVELS.items():
             began = time.perf_counter()
             watched = Watched(FIRST[name].make, "INSTANT_CACHE", **SMALL, cache_accuracy=accuracy, virtual_lights=lights,
-                              samples=samples, light_compensation=short)
+                              samples=samples, light_compensation=short, light_bound=bound)
             seconds = time.perf_counter() - began
             estimate = metrics.halves_relmse(picture(watched), truth)
             found[level] = {"seconds": seconds, "relmse": estimate.value, "error": estimate.error}
