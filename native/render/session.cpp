@@ -13,6 +13,9 @@
 
 namespace afterglow {
 
+/// Radius of a pixel filter, in pixels, to which all of a pixel is one point: an edge lies before it or behind.
+static constexpr float kPointFilter = 0.1f;
+
 static double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -261,7 +264,8 @@ void Session::run(RenderSettings settings) {
     }
     const bool carries = settings.carry_over && renderer.carries();
     if (carries) settings.film.passes |= Film::kCarriedPasses;
-    const bool looks = settings.sight && renderer.looks();
+    const bool looks = settings.sight && renderer.looks() &&
+                       filter_radius(settings.film.filter, settings.film.filter_width) > kPointFilter;
     if (looks) settings.film.passes |= Film::kSeenPasses;
     std::shared_ptr<Film> film;
     {
