@@ -172,11 +172,12 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
         sums.terms.resize(lights_.padded());
         for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
           Record& record = records_[which[i]];
+          const Rgb compensation = record.compensation;
           if (settings_.lights.short_rays && !lazy_)
             record.compensation = nearby_.repair(which[i], nearby, record, counts);
           // Most of what an edit makes unknown turns out to be as it was: then so is the sum, to the last bit.
           const bool changed = ask(walked, which[i], sums.terms.data(), counts);
-          if (changed || !record.summed || settings_.lights.short_rays) sum(which[i], sums);
+          if (changed || !record.summed || record.compensation != compensation) sum(which[i], sums);
           record.ready = true;
         }
         rays += counts.shadow + counts.bounce;

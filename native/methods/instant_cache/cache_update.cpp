@@ -321,7 +321,10 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
     for (const bool old : {true, false})
       if (const Bounds& bounds = old ? m.before : m.after; bounds.present())
         places.push_back({Crossing(bounds, 2.0f * (lift + error), lights_), old});
-  only_moved_.assign(visibility_.coloured() ? 0 : records_.size() * words, 0);
+  const bool solid = shown_.empty() && std::all_of(moved.begin(), moved.end(), [](const Moved& m) {
+                       return m.opaque_now || !m.after.present();
+                     });
+  only_moved_.assign(solid ? records_.size() * words : 0, 0);
   parallel_blocks(order.size(), kGroup, work.threads, [&](size_t begin, size_t end) {
     Box around;
     for (size_t i = begin; i < end; ++i) around.extend(records_[order[i].second].position);
@@ -345,7 +348,8 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
         place.crossing.parts(from, crosses);
         for (uint32_t w = 0; w < words; ++w) {
           unknown[w] |= crosses[w];
-          if (!place.old && !only_moved_.empty()) only_moved_[row * words + w] |= crosses[w];
+          if (!place.old && !only_moved_.empty() && crosses[w])
+            only_moved_[row * words + w] |= crosses[w] & ~visibility_.could_brighten(row, w);
         }
       }
     }

@@ -145,7 +145,7 @@ std::vector<Moved> Placement::update(const CommittedScene& committed, const Scen
         if (shape_stays) before.bounds.parts = parts;
       }
       moved.push_back({i, before.handle ? before.bounds : Bounds{}, now.bounds, keeps, !placed_otherwise,
-                       !before.lets_light_through});
+                       !before.lets_light_through, !now.lets_light_through});
     }
     before = std::move(now);
   }

@@ -32,6 +32,7 @@ struct Moved {
   bool keeps_places = false;  // the same triangles, elsewhere: places on them can follow
   bool in_place = false;      // nothing but what light passes changed
   bool opaque = false;        // as it stood before, wholly
+  bool opaque_now = false;    // as it stands
 };
 
 class Placement {
