@@ -289,11 +289,11 @@ void bind_session(py::module_& m) {
   m.def("caching_share", &caching_share, py::arg("view_moved"), py::arg("step"));
   m.def(
       "denoise_plan",
-      [](bool viewport, uint32_t samples, uint32_t kept) {
-        const DenoisePlan plan = denoise_plan(viewport, samples, kept);
+      [](bool viewport, uint32_t samples, uint32_t kept, bool exact) {
+        const DenoisePlan plan = denoise_plan(viewport, samples, kept, exact);
         return py::make_tuple(plan.prefilter, plan.fast);
       },
-      py::arg("viewport"), py::arg("samples"), py::arg("kept"));
+      py::arg("viewport"), py::arg("samples"), py::arg("kept"), py::arg("exact"));
   m.def("record_rays", &record, py::arg("scene"), py::arg("settings") = py::dict(), py::arg("most") = size_t(500'000));
   bind_denoise(m);
 }

@@ -35,9 +35,9 @@ uint32_t coarsest_step(uint64_t pixels, double sample_seconds) {
   return step;
 }
 
-DenoisePlan denoise_plan(bool viewport, uint32_t samples, uint32_t kept) {
-  const bool clean = kept >= kPrefilterTo;
-  return {.prefilter = !viewport && !clean && samples >= kPrefilterFrom, .fast = viewport || clean};
+DenoisePlan denoise_plan(bool viewport, uint32_t samples, uint32_t kept, bool exact) {
+  const bool clean = kept >= kPrefilterTo, quick = !exact && samples <= kQuickTo;
+  return {.prefilter = !viewport && !clean && samples >= kPrefilterFrom, .fast = viewport || clean || quick};
 }
 
 std::vector<PixelRequest> pass_requests(const PassPlan& plan, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1) {

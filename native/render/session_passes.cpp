@@ -246,9 +246,10 @@ bool Session::filter(const RenderSettings& settings, const Film& film, Image& im
   set_stage("denoising");
   const double begun = now();
   uint32_t samples;
+  bool exact;
   {
     const std::lock_guard lock(mutex_);
-    samples = statistics_.samples;
+    samples = statistics_.samples, exact = statistics_.exact;
   }
   const size_t pixels = size_t(image.width) * image.height;
   const auto images = std::make_shared<DenoiseImages>();
@@ -272,7 +273,7 @@ bool Session::filter(const RenderSettings& settings, const Film& film, Image& im
   for (size_t p = 0; p < pixels; ++p)
     for (size_t c = 0; c < 3; ++c) images->color[p * 3 + c] = image.rgba[p * 4 + c];
   const uint32_t kept = film.carries() && !settings.viewport ? typical_samples(film) : 0;
-  const DenoisePlan plan = denoise_plan(settings.viewport, samples, kept);
+  const DenoisePlan plan = denoise_plan(settings.viewport, samples, kept, exact);
   images->fast = plan.fast, images->prefilter = plan.prefilter, images->threads = settings.threads;
   try {
     if (denoiser_made_for_ != settings.denoiser) denoiser_.reset();

@@ -315,9 +315,10 @@ def both_sides(normals: NDArray[np.float64], sums: NDArray[np.float64], samples:
     scene having changed in frame `changed`: front, back, counts of both, normal, frame, bytes."""
 def caching_share(view_moved: bool, step: int) -> float:
     """Share of its paths that a viewport's pass, on a grid of so many pixels, sends into a cache that is filled as it renders."""
-def denoise_plan(viewport: bool, samples: int, kept: int) -> tuple[bool, bool]:
+def denoise_plan(viewport: bool, samples: int, kept: int, exact: bool) -> tuple[bool, bool]:
     """Whether a picture's albedo and normal are filtered by themselves first, and whether the small network does: by the samples
-    of each pixel on average, and those of the typical one in a film that keeps them from frame to frame (else 0)."""
+    of each pixel on average, and those of the typical one in a film that keeps them from frame to frame (else 0). exact: no cache
+    answers."""
 def cuckoo_map(keys: NDArray[np.uint32], usage: float, asked: NDArray[np.uint32]) -> dict[str, Any]:
     """The paper's map over keys that differ, with `usage` slots for each at first: found, the place of each asked key among the
     keys (-1: none); attempts, how often it was built; bytes."""

@@ -146,10 +146,11 @@ def session(built: Built, copies: list[str], width: int, height: int, **settings
 def test_guides_are_filtered_until_kept_samples_make_them_clean() -> None:
     """(prefilter, small network)"""
     for samples in (1, 3, 4, 64):
-        assert _native.denoise_plan(True, samples, 0) == (False, True)
-        assert _native.denoise_plan(False, samples, 0) == (samples >= 4, False)
-    assert _native.denoise_plan(False, 4, 11) == (True, False)
-    assert _native.denoise_plan(False, 4, 12) == (False, True)
+        for exact in (False, True):
+            assert _native.denoise_plan(True, samples, 0, exact) == (False, True)
+            assert _native.denoise_plan(False, samples, 0, exact) == (samples >= 4, samples == 1 and not exact)
+    assert _native.denoise_plan(False, 4, 11, False) == (True, False)
+    assert _native.denoise_plan(False, 4, 12, False) == (False, True)
 
 
 def test_a_render_is_denoised(copies: list[str], truth: np.ndarray) -> None:
