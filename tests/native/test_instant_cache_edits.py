@@ -139,6 +139,22 @@ def test_records_equal_fresh_ones_after_ten_thousand_edits() -> None:
     run_edits(10_000, 3, width=8, height=8, virtual_lights=32)
 
 
+def test_a_pane_goes_while_a_ball_comes_before_what_was_seen_through_it() -> None:
+    """What is seen through glass can become brighter at once with what may hide it: the ball alone does not tell."""
+    scene = room()
+    scene.materials["pane"] = node("transparent_bsdf", color=(0.5, 0.6, 0.7))
+    scene.add("Pane", quad((-1, -1, 1.0), (1, -1, 1.0), (1, 1, 1.0), (-1, 1, 1.0)), "pane")
+    scene.add("Shard", quad((-0.9, -0.9, 0.1), (-0.8, -0.9, 0.1), (-0.8, -0.8, 0.1), (-0.9, -0.8, 0.1)), "pane")
+    live = Live(scene)
+
+    def change() -> None:
+        live.move("Ball", translate((0.1, 0.2, 0.6)) @ scale((2.0, 2.0, 2.0)))
+        live.scene.remove_instances(live.built.instances["Pane"])
+
+    numbers = live.edit(change)
+    assert numbers["verified_worst"] <= 1e-5, (numbers["verified_differing"], numbers["verified_records"])
+
+
 def test_repair_on_demand_shows_the_same_image() -> None:
     images = []
     for on_demand in (False, True):
