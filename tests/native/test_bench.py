@@ -3,12 +3,14 @@
 
 import json
 import math
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 from afterglow import bench, blenders, cache
 from afterglow.bench import animation
+from afterglow.bench import figure as figures_of
 from afterglow.bench.figure import Context, Figure, Pairs, alternate, table
 from afterglow.bench.foundation.kitchen import fewest
 from afterglow.bench.foundation.light_passes import DIVIDED, compare, describe, light_of, resolved
@@ -102,6 +104,22 @@ def test_charts_of_the_instant_cache_are_drawn_from_what_was_measured() -> None:
     [(name, text)] = instant_charts.charts(figures).items()
     assert name == "instant_cache_error.svg" and "desk with chair" in text
     assert instant_charts.charts(figures[1:]) == {}
+
+
+def test_tables_and_charts_take_the_newest_of_several_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def write(file: str, age: int, **values: float) -> None:
+        path = tmp_path / file
+        path.write_text(json.dumps({"figures": [{"figure": f, "scene": "s", "value": v} for f, v in values.items()]}))
+        os.utime(path, (1000 - age, 1000 - age))
+
+    monkeypatch.setattr(figures_of, "FOLDER", tmp_path)
+    with pytest.raises(FileNotFoundError, match="make bench NAME=some"):
+        figures_of.recorded("some")
+    write("some_details.json", 2, a=1.0, b=1.0)
+    write("some_a_details.json", 1, a=2.0)
+    write("other_details.json", 0, a=3.0)
+    assert {f["figure"]: f["value"] for f in figures_of.recorded("some")} == {"a": 2.0, "b": 1.0}
+    assert [f["value"] for f in figures_of.recorded("some", [tmp_path / "other_details.json"])] == [3.0]
 
 
 def test_tables_have_the_papers_numbers_beside_ours() -> None:

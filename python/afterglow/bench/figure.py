@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from .. import chart
 
@@ -129,3 +131,16 @@ def table(figures: list[Figure]) -> str:
         rows.append((f.figure, f.scene, value, peer, ratio, f.goal, "yes" if f.holds else "NO"))
     notes = [f"  {f.title()}: {f.note}" for f in figures if f.note]
     return chart.table(rows) + ("\n\n" + "\n".join(notes) if notes else "") + "\n"
+
+
+FOLDER = Path("build/bench")
+
+
+def recorded(name: str, files: Sequence[str | Path] = ()) -> list[dict[str, Any]]:
+    """The figures of these details files, or of all that runs of a set left in build/bench; of two of the same, the newer.
+    Raises FileNotFoundError where there is none."""
+    paths = sorted((Path(f) for f in files or FOLDER.glob(f"{name}*_details.json")), key=lambda path: path.stat().st_mtime)
+    if not paths:
+        raise FileNotFoundError(f"{FOLDER} has no figures: make bench NAME={name}")
+    found = {(f["figure"], f["scene"]): f for path in paths for f in json.loads(path.read_text())["figures"]}
+    return list(found.values())

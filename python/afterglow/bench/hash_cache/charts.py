@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Figures 11 and 17 and table 1 of Roth et al. 2020 in our numbers, as charts, from what the bench measured:
-python -m afterglow.bench.hash_cache.charts [build/bench/hash_cache_details.json [folder]]."""
+python -m afterglow.bench.hash_cache.charts [folder [details.json ...]], build/bench and all figures there by default."""
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ... import chart
+from ..figure import FOLDER, recorded
 from .cells import PAPER
 
 Details = Mapping[str, Any]
@@ -75,9 +75,8 @@ def charts(figures: list[dict[str, Any]]) -> dict[str, str]:
 
 
 def main(arguments: list[str]) -> None:
-    path = Path(arguments[0] if arguments else "build/bench/hash_cache_details.json")
-    folder = Path(arguments[1]) if len(arguments) > 1 else path.parent
-    for name, text in charts(json.loads(path.read_text())["figures"]).items():
+    folder = Path(arguments[0]) if arguments else FOLDER
+    for name, text in charts(recorded("hash_cache", arguments[1:])).items():
         (folder / name).write_text(text)
         print(folder / name)
 

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Error against time at the default and two finer settings, every scene a line, from what the bench's figure `error` measured:
-python -m afterglow.bench.instant_cache.charts [build/bench/instant_cache_error_details.json [folder]]."""
+python -m afterglow.bench.instant_cache.charts [folder [details.json ...]], build/bench and all figures there by default."""
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
 
 from ... import chart
+from ..figure import FOLDER, recorded
 from .quality import LEVELS
 
 
@@ -29,11 +29,10 @@ def charts(figures: list[dict[str, Any]]) -> dict[str, str]:
 
 
 def main(arguments: list[str]) -> None:
-    path = Path(arguments[0] if arguments else "build/bench/instant_cache_error_details.json")
-    folder = Path(arguments[1]) if len(arguments) > 1 else path.parent
-    made = charts(json.loads(path.read_text())["figures"])
+    folder = Path(arguments[0]) if arguments else FOLDER
+    made = charts(recorded("instant_cache", arguments[1:]))
     if not made:
-        sys.exit(f"{path} has no figure of errors: make bench NAME=instant_cache FIGURE=error")
+        sys.exit("no figure of errors: make bench NAME=instant_cache FIGURE=error")
     for name, text in made.items():
         (folder / name).write_text(text)
         print(folder / name)

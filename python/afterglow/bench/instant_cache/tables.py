@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tables in the form of Debattista et al. 2009, ours beside theirs, from what the bench measured:
-python -m afterglow.bench.instant_cache.tables [build/bench/instant_cache_details.json]. Table 3 counts frames a second; table 5
-has the share of pixels with FLIP above 0.1 in place of HDR-VDP's."""
+python -m afterglow.bench.instant_cache.tables [details.json ...], all of build/bench by default. Table 3 counts frames a second;
+table 5 has the share of pixels with FLIP above 0.1 in place of HDR-VDP's."""
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from statistics import median
 from typing import Any
 
 from ... import chart
+from ..figure import recorded
 from .animations import FIRST, MOVING
 
 Row = tuple[str, ...]
@@ -99,5 +98,4 @@ def tables(figures: list[dict[str, Any]]) -> str:
 
 
 if __name__ == "__main__":
-    path = Path(sys.argv[1] if len(sys.argv) > 1 else "build/bench/instant_cache_details.json")
-    print(tables(json.loads(path.read_text())["figures"]))
+    print(tables(recorded("instant_cache", sys.argv[1:])))
