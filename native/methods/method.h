@@ -51,10 +51,12 @@ struct MethodTraits {
 };
 
 struct CachePoint {  // a diffuse lobe that asks for light
-  Vec3 position, normal, face_normal, outgoing;
-  Vec3 bent{0.0f};                         // the lobe's normal, which bumps turn away from the surface's
-  float footprint = 0.0f, segment = 0.0f;  // of a pixel on the surface; length of the ray that came here
+  Vec3 position, normal;
+  Vec3 bent{0.0f};         // the lobe's normal, which bumps turn away from the surface's
+  float footprint = 0.0f;  // of a pixel on the surface
   uint32_t instance = kNone, triangle = kNone;
+  Vec3 face_normal, outgoing;
+  float segment = 0.0f;      // length of the ray that came here
   float u = 0.0f, v = 0.0f;  // barycentric weights of the triangle's second and third corner
   float error = 0.0f;        // as SurfacePoint's
   uint16_t x = 0, y = 0;     // pixel of the full image, divided by the step of its pass

@@ -24,9 +24,41 @@ void VirtualLightColumns::fill(std::vector<VirtualLight> from) {
     for (int c = 0; c < 3; ++c) front[c][i] = l.front[c], back[c][i] = l.back[c];
     two_sided |= !is_black(l.back);
   }
+  rows.resize(size);
+  for (size_t i = 0; i < size; ++i)
+    rows[i] = {x[i],        y[i],        z[i],        nx[i],      ny[i],      nz[i],
+               front[0][i], front[1][i], front[2][i], back[0][i], back[1][i], back[2][i]};
 }
 
-void geometry_terms(const VirtualLightColumns& c, const Vec3& p, const Vec3& n, float bound, float* out, uint32_t first,
+/// Four rows become four numbers of twelve columns at a time: a number at a time takes as long as what it spares.
+void VirtualLightColumns::choose(std::span<const uint32_t> which, uint32_t chosen, LightColumns& out) const {
+  using Four = float __attribute__((vector_size(16)));
+  using Order = int __attribute__((vector_size(16)));
+  constexpr Order kLow{0, 4, 1, 5}, kHigh{2, 6, 3, 7}, kFirst{0, 1, 4, 5}, kLast{2, 3, 6, 7};
+  const uint32_t size = (chosen + 15) / 16 * 16;
+  std::vector<float>* const columns[12] = {&out.x,        &out.y,       &out.z,        &out.nx,
+                                           &out.ny,       &out.nz,      &out.front[0], &out.front[1],
+                                           &out.front[2], &out.back[0], &out.back[1],  &out.back[2]};
+  float* to[12];
+  for (int c = 0; c < 12; ++c) {
+    columns[c]->resize(size);
+    to[c] = columns[c]->data();
+  }
+  for (uint32_t i = 0; i < chosen; i += 4)
+    for (int part = 0; part < 12; part += 4) {
+      Four row[4];
+      for (int k = 0; k < 4; ++k) std::memcpy(&row[k], rows[which[i + k]].data() + part, sizeof(Four));
+      const Four a = __builtin_shuffle(row[0], row[1], kLow), b = __builtin_shuffle(row[0], row[1], kHigh),
+                 c = __builtin_shuffle(row[2], row[3], kLow), d = __builtin_shuffle(row[2], row[3], kHigh);
+      const Four column[4] = {__builtin_shuffle(a, c, kFirst), __builtin_shuffle(a, c, kLast),
+                              __builtin_shuffle(b, d, kFirst), __builtin_shuffle(b, d, kLast)};
+      for (int k = 0; k < 4; ++k) std::memcpy(to[part + k] + i, &column[k], sizeof(Four));
+    }
+  for (float* column : to) std::fill(column + chosen, column + size, 0.0f);
+  out.two_sided = two_sided;
+}
+
+void geometry_terms(const LightColumns& c, const Vec3& p, const Vec3& n, float bound, float* out, uint32_t first,
                     uint32_t count) {
   const float near = 0.8f * bound, scale = bound > 0.0f ? 1.0f / (0.4f * bound) : 0.0f;
   const float *x = c.x.data() + first, *y = c.y.data() + first, *z = c.z.data() + first, *nx = c.nx.data() + first,
@@ -78,8 +110,7 @@ Rgb total(const Lanes (&sums)[3]) {
 
 }  // namespace
 
-LightSums sum_lights(const VirtualLightColumns& lights, const std::vector<float> (&seen)[3], bool tinted, const Vec3& p,
-                     const Frame& frame, float bound) {
+LightSums sum_lights(const LightColumns& lights, const Vec3& p, const Frame& frame, float bound) {
   const float near = 0.8f * bound, scale = bound > 0.0f ? 1.0f / (0.4f * bound) : 0.0f;
   const Vec3 t = frame.t, b = frame.b, n = frame.n;
   const float least = lights.two_sided ? -kInfinity : 0.0f;
@@ -105,7 +136,6 @@ LightSums sum_lights(const VirtualLightColumns& lights, const std::vector<float>
     for (int c = 0; c < 3; ++c) {
       Lanes shines = lanes(lights.front[c], i);
       if (lights.two_sided) shines = term > 0.0f ? shines : -lanes(lights.back[c], i);
-      shines *= lanes(seen[tinted ? c : 0], i);
       light[c] += term * shines;
       step_t[c] += by_t * shines, step_b[c] += by_b * shines;
       turn_t[c] += turned * along_t * shines, turn_b[c] += turned * along_b * shines;

@@ -6,6 +6,8 @@
 // carry: the number of light *paths* that can fill a slot's bounce normalises it.
 #pragma once
 
+#include <array>
+#include <span>
 #include <vector>
 
 #include "lights/light_emission.h"
@@ -47,16 +49,22 @@ SlotPlan plan_slots(uint32_t count, uint32_t bounces);
 std::vector<VirtualLight> trace_virtual_lights(const WalkScene&, const LightEmission&, const VirtualLightOptions&,
                                                RayCounts&);
 
-/// The same lights, one array a value, so that a loop over them runs in vector registers. Padded to a multiple of
-/// 16 with lights that never shine.
-struct VirtualLightColumns {
+/// Lights as one array a value, so that a loop over them runs in vector registers. Padded to a multiple of 16 with
+/// lights that never shine.
+struct LightColumns {
   std::vector<float> x, y, z, nx, ny, nz;
   std::vector<float> front[3], back[3];  // intensities of each colour
-  std::vector<VirtualLight> lights;
-  uint32_t count = 0;      // slots
-  bool two_sided = false;  // any light shines backwards
-  void fill(std::vector<VirtualLight>);
+  bool two_sided = false;                // any light shines backwards; else `back` may be of any size
   uint32_t padded() const { return uint32_t(x.size()); }
+};
+/// All slots.
+struct VirtualLightColumns : LightColumns {
+  std::vector<VirtualLight> lights;
+  std::vector<std::array<float, 12>> rows;  // a light's numbers in the order of the columns
+  uint32_t count = 0;                       // slots
+  void fill(std::vector<VirtualLight>);
+  /// Some of them alone, `which` padded with any slots to a multiple of four.
+  void choose(std::span<const uint32_t> which, uint32_t count, LightColumns&) const;
 };
 
 /// (3) of Debattista et al. 2009: 0 below a, 1 above b, a cubic between.
@@ -67,9 +75,9 @@ inline float smooth_bound(float a, float b, float x) {
 
 /// The bounded geometry term (2) of all lights seen from a point, [padded()]: cos⁺ cos / d² · f(0.8 m, 1.2 m, d).
 /// Negative where the light shows its back. m = 0: no bound. Or those of some alone: `count` from slot `first` on.
-void geometry_terms(const VirtualLightColumns&, const Vec3& position, const Vec3& normal, float bound, float* out,
+void geometry_terms(const LightColumns&, const Vec3& position, const Vec3& normal, float bound, float* out,
                     uint32_t first, uint32_t count);
-inline void geometry_terms(const VirtualLightColumns& lights, const Vec3& position, const Vec3& normal, float bound,
+inline void geometry_terms(const LightColumns& lights, const Vec3& position, const Vec3& normal, float bound,
                            float* out) {
   geometry_terms(lights, position, normal, bound, out, 0, lights.padded());
 }
@@ -80,9 +88,7 @@ inline void geometry_terms(const VirtualLightColumns& lights, const Vec3& positi
 struct LightSums {
   Rgb light, step_t, step_b, turn_t, turn_b;
 };
-/// seen: the share of each light that arrives, [padded()]; tinted: in each colour, else the first holds for all.
-LightSums sum_lights(const VirtualLightColumns&, const std::vector<float> (&seen)[3], bool tinted, const Vec3& position,
-                     const Frame&, float bound);
+LightSums sum_lights(const LightColumns&, const Vec3& position, const Frame&, float bound);
 
 /// Whether both faces (not only the smooth normals) look at each other. front: the side that shines.
 bool can_see(const Vec3& position, const Vec3& face_normal, const VirtualLight&, bool front);

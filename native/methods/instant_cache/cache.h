@@ -52,8 +52,10 @@ constexpr float kAsItIs = 2.0f;  // an answer's weight: no light, a colour that 
 
 /// Memory that threads use for one record after the other: a value for each light.
 struct Sums {
-  std::vector<float> terms, seen[3];  // geometry_terms(); the share of each light that arrives, as for sum_lights()
-  std::vector<float> front, back;     // luminance that arrives from either side of what is seen
+  std::vector<float> terms;        // geometry_terms()
+  std::vector<uint32_t> which;     // slots that the record sees
+  LightColumns seen;               // these lights
+  std::vector<float> front, back;  // luminance of either side of what is seen
 };
 
 class Cache {
@@ -113,8 +115,7 @@ class Cache {
   bool ask(const WalkScene&, size_t record, float* terms, RayCounts&);
   void sum(size_t record, Sums&);
   void find_seen(size_t record, Sums&) const;
-  void find_brightness(Sums&) const;
-  float find_radius(size_t record, Sums&) const;
+  float find_radius(const Record&, Sums&) const;
   ShortRays short_rays(const WalkScene&) const;
   WalkScene walk(const CommittedScene& scene) const {
     return {scene, settings_.walk.limits, shown_.empty() ? nullptr : &shown_, false};

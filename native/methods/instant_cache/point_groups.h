@@ -12,11 +12,33 @@ namespace afterglow::instant_cache {
 
 /// A row of points in registers; the compiler splits it where they are narrower.
 using Lanes = float __attribute__((vector_size(32)));
+/// A place in a register, its last lane 0.
+using Four = float __attribute__((vector_size(16)));
+
+/// A box in registers.
+struct LaneBox {
+  static constexpr float kFar = 1e30f;  // the middle of nothing is a number
+  Four lower{kFar, kFar, kFar, 0.0f}, upper{-kFar, -kFar, -kFar, 0.0f};
+  LaneBox with(const Four& p) const {
+    LaneBox wider;
+    wider.lower = p < lower ? p : lower, wider.upper = p > upper ? p : upper;
+    return wider;
+  }
+  bool wider_than(float size) const {
+    const auto over = upper - lower > size;
+    uint64_t words[2];
+    std::memcpy(words, &over, sizeof(words));
+    return (words[0] | words[1]) != 0;
+  }
+  Box box() const { return {{lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}}; }
+};
+inline Four lanes_of(const CachePoint& p) { return Four{p.position.x, p.position.y, p.position.z, 0.0f}; }
 
 struct PointGroup {
   static constexpr uint32_t kMost = 256, kLanes = 8, kRows = kMost / kLanes;
   uint32_t instance = kNone, count = 0;
-  Box around;
+  LaneBox taken, row;  // around all points so far, and around those of the last row
+  Box around;          // all, once pad() was called
   float limit = 0.0f;  // the largest radius that any point allows
   float x[kMost], y[kMost], z[kMost], nx[kMost], ny[kMost], nz[kMost], inverse_limit[kMost];
   bool bumped = false;                                 // any lobe's normal differs; else the next columns are not set
@@ -25,32 +47,31 @@ struct PointGroup {
   float lower[3][kRows], upper[3][kRows];  // boxes around rows of kLanes points each
 
   /// Whether the point may join without making the group much wider than records are.
-  bool takes(const CachePoint& p) const {
-    if (p.instance != instance) return false;
-    Box wider = around;
-    wider.extend(p.position);
-    return max_component(wider.size()) <= 3.0f * limit;
+  bool takes(uint32_t of_instance, const Four& at) const {
+    return count && of_instance == instance && !taken.with(at).wider_than(3.0f * limit);
   }
   void begin(uint32_t of_instance) {
     instance = of_instance, count = 0, bumped = false;
-    around = Box{};
+    taken = row = LaneBox{};
     limit = 0.0f;
   }
-  void add(uint32_t index, const CachePoint& p, float most_pixels) {
+  void add(uint32_t index, const CachePoint& p, const Four& at, float most_pixels) {
     const float reach = most_pixels * p.footprint;
-    around.extend(p.position);
+    taken = taken.with(at), row = row.with(at);
     limit = std::max(limit, reach);
-    const uint32_t row = count / kLanes;
-    for (int axis = 0; axis < 3; ++axis) {
-      const float at = p.position[axis];
-      lower[axis][row] = count % kLanes ? std::min(lower[axis][row], at) : at;
-      upper[axis][row] = count % kLanes ? std::max(upper[axis][row], at) : at;
-    }
     x[count] = p.position.x, y[count] = p.position.y, z[count] = p.position.z;
     nx[count] = p.normal.x, ny[count] = p.normal.y, nz[count] = p.normal.z;
     if (p.bent != p.normal) bump(p);
     inverse_limit[count] = 1.0f / reach;
     point[count++] = index;
+    if (count % kLanes == 0) end_row();
+  }
+  void end_row() {
+    for (int axis = 0; axis < 3; ++axis) {
+      lower[axis][(count - 1) / kLanes] = row.lower[axis];
+      upper[axis][(count - 1) / kLanes] = row.upper[axis];
+    }
+    row = LaneBox{};
   }
   void bump(const CachePoint& p) {
     if (!bumped)
@@ -64,6 +85,8 @@ struct PointGroup {
   uint32_t all_rows() const { return uint32_t((uint64_t(1) << rows()) - 1); }
   /// Lanes without a point stand where nothing is; rows without one, too.
   void pad() {
+    if (count % kLanes) end_row();
+    around = taken.box();
     for (int axis = 0; axis < 3; ++axis)
       for (uint32_t row = rows(); row < kRows; ++row) lower[axis][row] = upper[axis][row] = 1e18f;
     const uint32_t end = std::min(rows() * kLanes, kMost);  // said to the compiler, which cannot know that count is
@@ -91,9 +114,10 @@ void in_groups(uint32_t count, float most_pixels, const At& at, const Wants& wan
     __builtin_prefetch(ahead), __builtin_prefetch(ahead + 64);
     if (!wants(i)) continue;
     const CachePoint& p = at(i);
+    const Four place = lanes_of(p);
     PointGroup* group = nullptr;
     for (PointGroup& g : open)
-      if (g.count && g.takes(p)) {
+      if (g.takes(p.instance, place)) {
         group = &g;
         break;
       }
@@ -102,7 +126,7 @@ void in_groups(uint32_t count, float most_pixels, const At& at, const Wants& wan
       close(*group);
       group->begin(p.instance);
     }
-    group->add(i, p, most_pixels);
+    group->add(i, p, place, most_pixels);
     if (group->count == PointGroup::kMost) close(*group);
   }
   for (PointGroup& g : open) close(g);

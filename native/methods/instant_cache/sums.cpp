@@ -17,6 +17,14 @@ using Lanes = float __attribute__((vector_size(4 * kLanes)));  // the compiler s
 constexpr float kSameLight = 0.02f;  // relative change of a record's light that leaves its radius as it is
 constexpr int kRadiusRounds = 5;     // three halves lead from the largest to the smallest
 
+/// Luminance of each light.
+void find_brightness(const std::vector<float> (&light)[3], std::vector<float>& out) {
+  const Rgb weights(luminance(Rgb(1, 0, 0)), luminance(Rgb(0, 1, 0)), luminance(Rgb(0, 0, 1)));
+  const float *red = light[0].data(), *green = light[1].data(), *blue = light[2].data();
+  out.resize(light[0].size());
+  for (size_t i = 0; i < out.size(); ++i) out[i] = weights.x * red[i] + weights.y * green[i] + weights.z * blue[i];
+}
+
 float total(const float* lanes) {
   float part[kLanes];
   std::memcpy(part, lanes, sizeof(part));
@@ -25,29 +33,23 @@ float total(const float* lanes) {
   return part[0];
 }
 
-void spread_bits(uint64_t word, uint32_t shift, float* out) {
-  const uint32_t bits = uint32_t(word >> shift) & 0xffff;
-  for (uint32_t l = 0; l < kLanes; ++l) out[l] = float(bits >> l & 1);
-}
-
 }  // namespace
 
-/// The share of each light that the record sees.
+/// The lights that the record sees, as bright as they arrive: a quarter to a half of all, and so are the sums' costs.
 void Cache::find_seen(size_t index, Sums& sums) const {
-  const uint32_t size = lights_.padded();
-  const uint64_t* seen = visibility_.seen(index);
-  const bool tinted = visibility_.coloured();
-  for (int c = 0; c < (tinted ? 3 : 1); ++c) {
-    sums.seen[c].resize(size);
-    for (uint32_t i = 0; i < size; i += kLanes) spread_bits(seen[i / 64], i % 64, sums.seen[c].data() + i);
-  }
-  if (!tinted) return;
+  std::vector<uint32_t>& which = sums.which;
+  const uint64_t* bits_of = visibility_.seen(index);
+  which.assign(lights_.padded() + 3, 0);
+  uint32_t count = 0;
   for (uint32_t w = 0; w < visibility_.words(); ++w)
-    for (uint64_t bits = seen[w]; bits; bits &= bits - 1) {
-      const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
-      const Rgb passes = visibility_.get(index, k);
-      for (int c = 0; c < 3; ++c) sums.seen[c][k] = passes[c];
-    }
+    for (uint64_t bits = bits_of[w] & (front_[w] | back_[w]); bits; bits &= bits - 1)
+      which[count++] = w * 64 + uint32_t(std::countr_zero(bits));
+  lights_.choose(which, count, sums.seen);
+  if (!visibility_.coloured()) return;
+  for (uint32_t i = 0; i < count; ++i) {
+    const Rgb passes = visibility_.get(index, which[i]);
+    for (int c = 0; c < 3; ++c) sums.seen.front[c][i] *= passes[c], sums.seen.back[c][i] *= passes[c];
+  }
 }
 
 /// The gradients are exact for the lights that are seen; what comes into sight or leaves it nearby is left aside.
@@ -55,7 +57,7 @@ void Cache::sum(size_t index, Sums& sums) {
   Record& record = records_[index];
   find_seen(index, sums);
   const Frame frame(record.normal);
-  const LightSums of = sum_lights(lights_, sums.seen, visibility_.coloured(), record.position, frame, bound_);
+  const LightSums of = sum_lights(sums.seen, record.position, frame, bound_);
   record.irradiance = is_finite(of.light) ? of.light : Rgb(0.0f);
   const bool sound = is_finite(of.step_t) && is_finite(of.step_b) && is_finite(of.turn_t) && is_finite(of.turn_b);
   const glm::mat3 none(0.0f);
@@ -64,7 +66,7 @@ void Cache::sum(size_t index, Sums& sums) {
   const float here = luminance(record.irradiance);
   record.summed = true;
   if (std::fabs(here - record.measured) > kSameLight * record.measured) {
-    record.radius = find_radius(index, sums);
+    record.radius = find_radius(record, sums);
     record.measured = here;
   }
   record.irradiance += record.compensation;
@@ -72,15 +74,16 @@ void Cache::sum(size_t index, Sums& sums) {
 
 /// As far as the gradient tells the truth, to a tolerance, in four directions: it ends where light bends, as before
 /// corners, to which a slope at the record alone is blind. Shadows are left aside.
-float Cache::find_radius(size_t index, Sums& sums) const {
-  const Record& record = records_[index];
+float Cache::find_radius(const Record& record, Sums& sums) const {
   const float here = luminance(record.irradiance), least = spacing_.least_pixels * record.footprint;
   if (!(here > 0.0f)) return record.reach;
-  const uint32_t size = lights_.padded();
-  const bool two_sided = lights_.two_sided;
-  find_brightness(sums);
+  const LightColumns& seen = sums.seen;
+  const uint32_t size = seen.padded();
+  const bool two_sided = seen.two_sided;
+  find_brightness(seen.front, sums.front);
+  if (two_sided) find_brightness(seen.back, sums.back);
   const auto light_there = [&](const Vec3& offset) {
-    geometry_terms(lights_, record.position + offset, record.normal, bound_, sums.terms.data());
+    geometry_terms(seen, record.position + offset, record.normal, bound_, sums.terms.data());
     Lanes sum = {};
     const Lanes none = {};
     for (uint32_t i = 0; i < size; i += kLanes) {
@@ -121,22 +124,6 @@ float Cache::find_radius(size_t index, Sums& sums) const {
     radius *= std::clamp(std::sqrt(bend / off), 0.5f, 0.8f);  // it is of second order
   }
   return std::min(std::max(radius, least), record.reach);
-}
-
-/// Luminance that arrives from either side of what is seen, as find_seen() told.
-void Cache::find_brightness(Sums& sums) const {
-  const uint32_t size = lights_.padded();
-  const bool tinted = visibility_.coloured();
-  const Rgb weights(luminance(Rgb(1, 0, 0)), luminance(Rgb(0, 1, 0)), luminance(Rgb(0, 0, 1)));
-  const auto brightness = [&](const std::vector<float>(&light)[3], std::vector<float>& out) {
-    out.assign(size, 0.0f);
-    for (int c = 0; c < 3; ++c) {
-      const float *shines = light[c].data(), *share = sums.seen[tinted ? c : 0].data();
-      for (uint32_t i = 0; i < size; ++i) out[i] += weights[c] * share[i] * shines[i];
-    }
-  };
-  brightness(lights_.front, sums.front);
-  if (lights_.two_sided) brightness(lights_.back, sums.back);
 }
 
 }  // namespace afterglow::instant_cache
