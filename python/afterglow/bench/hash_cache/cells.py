@@ -50,10 +50,12 @@ def lookups(context: Context) -> list[Figure]:
 
 
 def reconstruction(context: Context) -> list[Figure]:
-    """Frames a second with a warm cache and no caching paths: camera rays, direct light, look-ups, filter, film."""
+    """Frames a second with a warm cache and no caching paths: camera rays, direct light, look-ups, filter, film. Further samples,
+    those of edges too, are left out."""
     size = (800, 600)
     jobs = [walk.render(None, f, 4) for f in range(2)]
-    jobs += [walk.render(None, 10 + f, 1, hash_resolution=0.0, hash_running=False, hash_lights=1, hash_extra=0.0)
+    jobs += [walk.render(None, 10 + f, 1, hash_resolution=0.0, hash_running=False, hash_lights=1, hash_extra=0.0,
+                         sight=False)
              for f in range(context.pairs)]
     answers, _ = walk.run(jobs, size)
     seconds = sorted(a["seconds"] for a in answers[3:])
