@@ -54,7 +54,7 @@ std::vector<VirtualLight> trace_virtual_lights(const WalkScene&, const LightEmis
 struct LightColumns {
   std::vector<float> x, y, z, nx, ny, nz;
   std::vector<float> front[3], back[3];  // intensities of each colour
-  bool two_sided = false;                // any light shines backwards; else `back` may be of any size
+  bool two_sided = false;                // any light shines backwards; else nobody reads `back`
   uint32_t padded() const { return uint32_t(x.size()); }
 };
 /// All slots.
