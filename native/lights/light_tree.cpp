@@ -8,6 +8,7 @@
 #include <array>
 #include <numeric>
 
+#include "base/lanes.h"
 #include "base/parallel.h"
 
 namespace afterglow {
@@ -135,20 +136,7 @@ bool behind(const Box& box, const Vec3& position, const Vec3& normal) {
   return glm::dot(center, normal) + glm::dot(half, glm::abs(normal)) < 0.0f;
 }
 
-using Eight = float __attribute__((vector_size(32)));  // the compiler splits it where registers are narrower
-using EightBits = int32_t __attribute__((vector_size(32)));
-
-Eight load(const std::vector<float>& column, uint32_t at) {
-  Eight v;
-  __builtin_memcpy(&v, column.data() + at, sizeof(v));
-  return v;
-}
-Eight root(Eight v) {
-  for (int i = 0; i < 8; ++i) v[i] = std::sqrt(v[i]);
-  return v;
-}
-Eight least(Eight a, Eight b) { return a < b ? a : b; }
-Eight most(Eight a, Eight b) { return a > b ? a : b; }
+Eight load(const std::vector<float>& column, uint32_t at) { return load_eight(column.data() + at); }
 
 }  // namespace
 
@@ -162,30 +150,31 @@ float LightTree::weigh(uint32_t first, uint32_t count, const Vec3& p, const Vec3
     const Columns& c = columns_;
     const Eight x = p.x - load(c.center_x, at), y = p.y - load(c.center_y, at), z = p.z - load(c.center_z, at);
     const Eight r2 = load(c.radius2, at), cos_n = load(c.cos_normals, at), sin_n = load(c.sin_normals, at);
-    const Eight d2 = x * x + y * y + z * z, share = least(r2 / most(d2, zero + 1e-37f), one);
+    const Eight d2 = x * x + y * y + z * z, share = smaller(r2 / larger(d2, zero + 1e-37f), one);
     const EightBits outside = share < one;
-    const Eight sin_box = root(share), cos_box = root(one - share), inverse_d = one / root(most(d2, zero + 1e-37f));
+    const Eight sin_box = square_root(share), cos_box = square_root(one - share),
+                inverse_d = one / square_root(larger(d2, zero + 1e-37f));
 
     Eight cosine = (load(c.axis_x, at) * x + load(c.axis_y, at) * y + load(c.axis_z, at) * z) * inverse_d;
-    cosine = load(c.two_sided, at) > zero ? most(cosine, -cosine) : cosine;
-    cosine = most(least(cosine, one), -one);
-    const Eight sine = root(one - cosine * cosine);
+    cosine = load(c.two_sided, at) > zero ? larger(cosine, -cosine) : cosine;
+    cosine = larger(smaller(cosine, one), -one);
+    const Eight sine = square_root(one - cosine * cosine);
     const EightBits within = cosine > cos_n;
     const Eight cos_x = within ? one : cosine * cos_n + sine * sin_n;
     const Eight sin_x = within ? zero : sine * cos_n - cosine * sin_n;
     const Eight nearest = cos_x > cos_box ? one : cos_x * cos_box + sin_x * sin_box;
     // A cone of normals wider than a half turn together with the box can go beyond what the cosines can say.
-    const Eight directed = nearest > load(c.cos_emission, at) ? most(nearest, zero) : -one;
+    const Eight directed = nearest > load(c.cos_emission, at) ? larger(nearest, zero) : -one;
     const Eight cos_out = (outside & (cos_n > -one)) ? directed : one;
 
     Eight cos_in = one;
     if (one_side) {
-      const Eight k = most(least(-(n.x * x + n.y * y + n.z * z) * inverse_d, one), -one);
-      const Eight facing = k > cos_box ? one : k * cos_box + root(one - k * k) * sin_box;
+      const Eight k = larger(smaller(-(n.x * x + n.y * y + n.z * z) * inverse_d, one), -one);
+      const Eight facing = k > cos_box ? one : k * cos_box + square_root(one - k * k) * sin_box;
       cos_in = outside ? facing : one;
     }
     const Eight intensity = load(c.intensity, at);
-    const Eight w = most(intensity * cos_out * cos_in / most(d2, most(r2, zero + 1e-30f)), zero + 1e-35f);
+    const Eight w = larger(intensity * cos_out * cos_in / larger(d2, larger(r2, zero + 1e-30f)), zero + 1e-35f);
     const Eight alive = ((cos_out >= zero) & (cos_in > zero) & (intensity > zero)) ? w : zero;
     for (uint32_t i = 0; i < 8; ++i) weights[block + i] = alive[i];
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "base/lanes.h"
 #include "transport/virtual_lights.h"
 
 namespace afterglow {
@@ -81,22 +82,9 @@ void geometry_terms(const LightColumns& c, const Vec3& p, const Vec3& n, float b
 namespace {
 
 constexpr uint32_t kLanes = 8;
-using Lanes = float __attribute__((vector_size(4 * kLanes)));  // the compiler splits it where registers are narrower
+using Lanes = Eight;
 
-Lanes lanes(const std::vector<float>& column, size_t first) {
-  Lanes v;
-  std::memcpy(&v, column.data() + first, sizeof(v));
-  return v;
-}
-
-Lanes square_root(const Lanes& v) {
-  float values[kLanes];
-  std::memcpy(values, &v, sizeof(v));
-  for (float& value : values) value = std::sqrt(value);
-  Lanes root;
-  std::memcpy(&root, values, sizeof(root));
-  return root;
-}
+Lanes lanes(const std::vector<float>& column, size_t first) { return load_eight(column.data() + first); }
 
 /// Always in the same order.
 Rgb total(const Lanes (&sums)[3]) {

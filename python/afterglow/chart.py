@@ -155,9 +155,10 @@ def lines(title: str, series: Sequence[Line], x_name: str, y_name: str, log: tup
             place = labels.place(px, py, 5.5 * len(line.labels[j]), 10) if j < len(line.labels) else None
             if place is not None:
                 body.append(_text(place[0], place[1] + 3.5, line.labels[j], size=10, extra=f'fill="{color}"'))
-        body.append(_marker(marker, WIDTH - RIGHT - 200, TOP + 14 + 16 * i, color))
-        body.append(_text(WIDTH - RIGHT - 190, TOP + 18 + 16 * i, line.name, "start"))
-    return _frame(title, body)
+        body.append(_marker(marker, WIDTH - RIGHT + 16, TOP + 14 + 16 * i, color))
+        body.append(_text(WIDTH - RIGHT + 26, TOP + 18 + 16 * i, line.name, "start"))
+    # Names stand beside the lines: wherever among them, some would run through.
+    return _frame(title, body, width=WIDTH + 26 + round(7 * max((len(line.name) for line in series), default=0)))
 
 
 def bars(title: str, rows: Sequence[tuple[str, float, float | None, bool | None]]) -> str:

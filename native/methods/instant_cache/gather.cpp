@@ -24,7 +24,7 @@ void in_rows(const Entry& e, const PointGroup& group, uint32_t among, float angl
 }
 
 void add(float* to, const Lanes& by) {
-  const Lanes sum = lanes(to) + by;
+  const Lanes sum = load_eight(to) + by;
   std::memcpy(to, &sum, sizeof(sum));
 }
 
@@ -100,7 +100,7 @@ void Cache::find_open(std::span<const CachePoint> points, std::span<const uint32
           const Entry& e = octree_.entry(r);
           if (e.instance != group.instance) return true;
           in_rows(e, group, left, spacing_.angle_scale, [&](uint32_t row, const RowOfPoints& found) {
-            const Lanes best = larger(lanes(most + row * kLanes), found.weight);
+            const Lanes best = larger(load_eight(most + row * kLanes), found.weight);
             std::memcpy(most + row * kLanes, &best, sizeof(best));
             if (all_above(best, Lanes{} + kCoveringWeight)) left &= ~(1u << row);
           });

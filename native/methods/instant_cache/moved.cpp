@@ -15,25 +15,6 @@ constexpr uint32_t kMostParts = 64;  // of a mesh
 constexpr float kFar = 1e18f;        // where boxes stand that no ray meets
 constexpr float kRounding = 1e-6f;   // of lengths and of their products
 
-constexpr uint32_t kLanes = 8;
-using Lanes = float __attribute__((vector_size(4 * kLanes)));  // the compiler splits it where registers are narrower
-using Mask = int32_t __attribute__((vector_size(4 * kLanes)));
-
-Lanes lanes(const std::vector<float>& column, size_t first) {
-  Lanes v;
-  std::memcpy(&v, column.data() + first, sizeof(v));
-  return v;
-}
-Lanes length(const Lanes& v) { return v < 0.0f ? -v : v; }
-/// A bit a lane.
-uint32_t bits_of(const Mask& mask) {
-  const Mask bits = mask & Mask{1, 2, 4, 8, 16, 32, 64, 128};
-  uint64_t words[4];
-  std::memcpy(words, &bits, sizeof(words));
-  const uint64_t any = (words[0] | words[1]) | (words[2] | words[3]);
-  return uint32_t(any | any >> 32);
-}
-
 bool same(const Affine& a, const Affine& b) { return a.x == b.x && a.y == b.y && a.z == b.z && a.p == b.p; }
 
 Box widened(const Box& box, float share, float least) {
@@ -207,16 +188,22 @@ bool Crossing::box(const Vec3& from, const Vec3& spread, const uint64_t* among, 
     const uint64_t asked = among[w];  // may be the same memory
     crosses[w] = 0;
     if (!asked) continue;
-    for (uint32_t k = 0; k < 64; k += kLanes) {
-      if (!(asked >> k & 0xff)) continue;  // half of them
-      const Lanes x = lanes(x_, 64 * w + k), y = lanes(y_, 64 * w + k), z = lanes(z_, 64 * w + k);
-      const Lanes dx = length(x - o.x), dy = length(y - o.y), dz = length(z - o.z);
-      const Lanes cx = length(o.y * z - o.z * y), cy = length(o.z * x - o.x * z), cz = length(o.x * y - o.y * x);
+    const float *x = x_.data() + 64 * w, *y = y_.data() + 64 * w, *z = z_.data() + 64 * w;
+    uint8_t hits[64];
+    for (int k = 0; k < 64; ++k) {
+      const float dx = std::fabs(x[k] - o.x), dy = std::fabs(y[k] - o.y), dz = std::fabs(z[k] - o.z);
+      const float sx = std::fabs(x[k] + o.x), sy = std::fabs(y[k] + o.y), sz = std::fabs(z[k] + o.z);
+      const float cx = std::fabs(o.y * z[k] - o.z * y[k]), cy = std::fabs(o.z * x[k] - o.x * z[k]),
+                  cz = std::fabs(o.x * y[k] - o.y * x[k]);
       // Not a number: it may.
-      const auto misses = (length(x + o.x) > twice.x + dx) | (length(y + o.y) > twice.y + dy) |
-                          (length(z + o.z) > twice.z + dz) | (cx > e.y * dz + e.z * dy + rest) |
-                          (cy > e.z * dx + e.x * dz + rest) | (cz > e.x * dy + e.y * dx + rest);
-      crosses[w] |= uint64_t(bits_of(~misses)) << k;
+      hits[k] = uint8_t(!(sx > twice.x + dx) & !(sy > twice.y + dy) & !(sz > twice.z + dz) &
+                        !(cx > e.y * dz + e.z * dy + rest) & !(cy > e.z * dx + e.x * dz + rest) &
+                        !(cz > e.x * dy + e.y * dx + rest));
+    }
+    for (int k = 0; k < 64; k += 8) {
+      uint64_t bytes;
+      std::memcpy(&bytes, hits + k, 8);
+      crosses[w] |= (bytes * 0x0102040810204080ull >> 56) << k;  // a bit a byte
     }
     crosses[w] &= asked;
     any |= crosses[w];

@@ -6,12 +6,13 @@
 
 #include <span>
 
+#include "base/lanes.h"
 #include "methods/instant_cache/interpolation.h"
 
 namespace afterglow::instant_cache {
 
-/// A row of points in registers; the compiler splits it where they are narrower.
-using Lanes = float __attribute__((vector_size(32)));
+/// A row of points in a register.
+using Lanes = Eight;
 /// A place in a register, its last lane 0.
 using Four = float __attribute__((vector_size(16)));
 
@@ -151,19 +152,6 @@ inline uint32_t rows_near(const Entry& e, const PointGroup& g) {
   return bits;
 }
 
-inline Lanes lanes(const float* from) {
-  Lanes v;
-  std::memcpy(&v, from, sizeof(v));
-  return v;
-}
-inline Lanes square_root(const Lanes& v) {
-  float values[PointGroup::kLanes];
-  std::memcpy(values, &v, sizeof(v));
-  for (float& value : values) value = std::sqrt(value);
-  return lanes(values);
-}
-inline Lanes larger(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
-inline Lanes smaller(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
 inline bool any_above(const Lanes& v, const Lanes& bound) {
   const auto above = v > bound;
   uint64_t words[sizeof(v) / 8], any = 0;
@@ -186,9 +174,10 @@ struct RowOfPoints {
 inline RowOfPoints compare(const Entry& e, const PointGroup& g, uint32_t row, float angle_scale) {
   const uint32_t first = row * PointGroup::kLanes;
   const Vec3 at = e.position, n = e.normal;
-  const Lanes dx = lanes(g.x + first) - at.x, dy = lanes(g.y + first) - at.y, dz = lanes(g.z + first) - at.z;
-  const Lanes nx = lanes(g.nx + first), ny = lanes(g.ny + first), nz = lanes(g.nz + first), none = {};
-  const Lanes inverse = larger(none + e.inverse_radius, lanes(g.inverse_limit + first));
+  const Lanes dx = load_eight(g.x + first) - at.x, dy = load_eight(g.y + first) - at.y,
+              dz = load_eight(g.z + first) - at.z;
+  const Lanes nx = load_eight(g.nx + first), ny = load_eight(g.ny + first), nz = load_eight(g.nz + first), none = {};
+  const Lanes inverse = larger(none + e.inverse_radius, load_eight(g.inverse_limit + first));
   const Lanes d2 = (dx * dx + dy * dy + dz * dz) * (inverse * inverse);
   const Lanes turn = 1.0f - (n.x * nx + n.y * ny + n.z * nz);
   const Lanes left = 1.0f - square_root(d2) - angle_scale * square_root(larger(turn, none));
@@ -205,13 +194,13 @@ inline Lanes light_at(const Record& r, int c, const PointGroup& g, uint32_t row,
   const float sx = r.by_step[0][c], sy = r.by_step[1][c], sz = r.by_step[2][c];
   const float tx = r.by_turn[0][c], ty = r.by_turn[1][c], tz = r.by_turn[2][c];
   const Lanes none = {};
-  const Lanes line = here + sx * p.dx + sy * p.dy + sz * p.dz + tx * (lanes(g.nx + first) - n.x) +
-                     ty * (lanes(g.ny + first) - n.y) + tz * (lanes(g.nz + first) - n.z);
+  const Lanes line = here + sx * p.dx + sy * p.dy + sz * p.dz + tx * (load_eight(g.nx + first) - n.x) +
+                     ty * (load_eight(g.ny + first) - n.y) + tz * (load_eight(g.nz + first) - n.z);
   const Lanes light = smaller(larger(line, none + 0.5f * here), none + 2.0f * here);
   if (!g.bumped) return light;
-  const Lanes bend = lanes(g.bend + first);
-  const Lanes turned =
-      light + here * bend + tx * lanes(g.bx + first) + ty * lanes(g.by + first) + tz * lanes(g.bz + first);
+  const Lanes bend = load_eight(g.bend + first);
+  const Lanes turned = light + here * bend + tx * load_eight(g.bx + first) + ty * load_eight(g.by + first) +
+                       tz * load_eight(g.bz + first);
   return bend != 0.0f ? smaller(larger(turned, none), 2.0f * light) : light;
 }
 

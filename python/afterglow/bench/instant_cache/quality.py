@@ -19,7 +19,7 @@ DIFFERENCE = ("cornell_statue", "wobbling_cylinder", "desk_with_chair", "bunnies
 SMALL = {"width": 300, "height": 200, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 1.5, "caustics_reflective": False,
          "caustics_refractive": False}
 REFERENCE_SAMPLES = 512
-# As a render has them by default: samples until their believed error is below the first, the second at most.
+# Samples until the believed error is what a render accepts by default; as many as the office with blinds asks for.
 ACCURACY, MOST_SAMPLES = 0.03, 4096
 # accuracy of the cache, virtual lights, short rays, bound
 LEVELS = {"default": (0.05, 256, 0, 2.0), "finer": (0.025, 2048, 16, 4.0), "finest": (0.0125, 16384, 64, 4.0)}
