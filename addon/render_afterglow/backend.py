@@ -41,6 +41,11 @@ def method_descriptions() -> list[dict[str, Any]]:
     return list(afterglow.method_descriptions()) or _FALLBACK_METHODS
 
 
+def chosen_method(method: str, viewport: bool) -> str:
+    """The method that renders where the engine may choose; the one that is named otherwise."""
+    return method if afterglow is None else afterglow.chosen_method(method, viewport)
+
+
 def denoisers() -> list[dict[str, Any]]:
     """Every known denoiser, with the reason where it is not available."""
     if afterglow is None:

@@ -375,5 +375,7 @@ def cache_status(statistics: dict[str, Any]) -> list[str]:
     for name, word in (("records_new", "new"), ("records_updated", "updated"), ("records_dropped", "dropped")):
         if values.get(name):
             counts.append(f"{int(values[name]):,} {word}")
+    if values.get("records_refused"):
+        counts.append("memory full")
     rays = values.get("visibility_rays_now")
     return [", ".join(counts)] + ([f"{int(rays):,} visibility rays"] if rays else [])

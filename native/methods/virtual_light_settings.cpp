@@ -43,7 +43,7 @@ void VirtualLightSettings::configure(const Settings& settings) {
     if (name == "virtual_lights") count = uint32_t(std::clamp<int64_t>(integer_of(value), 1, 1 << 20));
     if (name == "light_pattern") pattern = uint32_t(integer_of(value));
     if (name == "light_bound") bound = std::max(float(number_of(value)), 0.0f);
-    if (name == "light_compensation") short_rays = uint32_t(std::clamp<int64_t>(integer_of(value), 0, 1024));
+    if (name == "light_compensation") short_rays = uint32_t(std::clamp<int64_t>(integer_of(value), 0, kMostShortRays));
     if (name == "interleave") interleave = integer_of(value) != 0;
   }
 }

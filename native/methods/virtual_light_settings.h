@@ -8,6 +8,7 @@
 namespace afterglow {
 
 struct VirtualLightSettings {
+  static constexpr uint32_t kMostShortRays = 1024;
   uint32_t count = 256, pattern = 0;
   float bound = 2.0f;
   bool interleave = true;

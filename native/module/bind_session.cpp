@@ -6,6 +6,7 @@
 
 #include "module/bindings.h"
 #include "render/record_rays.h"
+#include "render/renderer.h"
 #include "render/session.h"
 
 namespace afterglow {
@@ -286,6 +287,7 @@ void bind_session(py::module_& m) {
       .def("read", &read, py::arg("name") = "combined", py::arg("out") = py::none())
       .def("statistics", &statistics);
   m.def("method_descriptions", &descriptions);
+  m.def("chosen_method", &Renderer::chosen, py::arg("method"), py::arg("viewport"));
   m.def("caching_share", &caching_share, py::arg("view_moved"), py::arg("step"));
   m.def(
       "denoise_plan",

@@ -196,6 +196,7 @@ class LightPath {
   void take(const LightPath& other) {
     from_ = other.from_, ray_ = other.ray_, context_ = other.context_;
     throughput_ = other.throughput_, first_ = other.first_, guided_ = other.guided_;
+    shadowless_ = other.shadowless_;
     vertex_ = other.vertex_;
   }
 

@@ -265,6 +265,8 @@ class Session:
 def method_descriptions() -> list[dict[str, Any]]:
     """Every method about itself: id, label, description, settings [{name, label, description, type, default, min, max, unit}],
     debug_views, statistics."""
+def chosen_method(method: str, viewport: bool) -> str:
+    """The id of the method that renders: AUTO stands for another one in viewports than in renders."""
 def denoisers(search: Sequence[str] = ()) -> list[dict[str, Any]]:
     """[{id, label, available: bool, reason, path, version}]"""
 def denoise(color: NDArray[np.float32], albedo: NDArray[np.float32] | None = None, normal: NDArray[np.float32] | None = None,

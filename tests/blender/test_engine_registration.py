@@ -128,10 +128,13 @@ def test_viewports_better_the_lights_of_a_cache(in_blender: Run) -> None:
         s = bpy.context.scene
         s.render.engine = 'AFTERGLOW'
         own = s.afterglow
-        own.method = 'INSTANT_CACHE'
         asked = addon('properties.scene').session_settings
         names = 'virtual_lights', 'light_compensation', 'light_bound'
         told = lambda viewport: [asked(s, viewport)[name] for name in names]
+        own.instant_cache.virtual_lights = 512
+        result(automatic=told(True), without_cache='virtual_lights' in asked(s, False))
+        own.instant_cache.virtual_lights = 256
+        own.method = 'INSTANT_CACHE'
         result(render=told(False), viewport=told(True))
         own.instant_cache.virtual_lights = 65536
         result(most=told(True))
@@ -140,6 +143,7 @@ def test_viewports_better_the_lights_of_a_cache(in_blender: Run) -> None:
         result(without=told(True))
         """
     )
+    assert found["automatic"] == [640, 16, 4.0] and not found["without_cache"]
     assert found["render"] == found["without"] == [256, 0, 2.0]
     assert found["viewport"] == [320, 16, 4.0]
     assert found["most"] == [65536, 16, 4.0]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from functools import partial
 from typing import Any
 
@@ -113,6 +114,7 @@ def painted_room() -> Description:
 
 def run_edits(count: int, seed: int, on_demand: bool = False, **settings: Any) -> None:
     live, rng, state = Live(painted_room(), **settings), np.random.default_rng(seed), {}
+    verified = records = 0
     for step in range(count):
         if on_demand and step % 7 == 3:
             live.session.update({"cache_on_demand": bool(rng.integers(2))})
@@ -120,7 +122,9 @@ def run_edits(count: int, seed: int, on_demand: bool = False, **settings: Any) -
         numbers = live.edit(lambda: random_edit(live, rng, state))
         assert numbers["verified_worst"] <= 1e-5, (step, numbers["verified_differing"], numbers["verified_records"])
         assert np.isfinite(live.image()).all()
+        verified, records = verified + numbers["verified_records"], records + numbers["records"]
     assert live.numbers()["records"] > 10
+    assert verified > 0.5 * records  # others wait until a point wants them
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -164,6 +168,26 @@ def test_repair_on_demand_shows_the_same_image() -> None:
             assert numbers["verified_worst"] <= 1e-5
         images.append(live.image())
     assert abs(images[0] - images[1]).mean() < 0.02 * images[0][..., :3].mean()
+
+
+@pytest.mark.parametrize("short_rays", [0, 4])
+def test_updates_that_are_interrupted_leave_no_old_light(short_rays: int) -> None:
+    """Whenever an update of another colour is stopped: the next one shows what a fresh record would."""
+    live = Live(painted_room(), width=160, height=120, virtual_lights=2048, light_compensation=short_rays, light_bound=4.0)
+    rng = np.random.default_rng(5)
+    for step in range(40):
+        live.session.update({"cache_verify": False})
+        live.session.wait()
+        live.scene.set_light(live.built.lights["Lamp"], color=tuple(rng.uniform(0.1, 1, 3)))
+        live.scene.commit()
+        live.session.start()
+        time.sleep(float(rng.uniform(0, 0.03)))
+        live.session.cancel()
+        live.session.update({"cache_verify": True})
+        live.run()
+        numbers = live.numbers()
+        assert numbers["verified_worst"] <= 1e-5, (step, numbers["verified_differing"], numbers["verified_records"])
+        assert numbers["verified_records"] > 0.9 * numbers["records"]
 
 
 def test_one_and_two_threads_show_the_same_image_through_edits() -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from afterglow.scenes import Description, node, translate
 from afterglow.scenes.native import Built, graph
-from afterglow.scenes.rooms import cornell_box, diffuse, furnace
-from afterglow.scenes.shapes import sphere
+from afterglow.scenes.rooms import cornell_box, diffuse, furnace, noise_picture
+from afterglow.scenes.shapes import quad, sphere
 
 SETTINGS: dict[str, Any] = dict(method="INSTANT_CACHE", width=48, height=48, samples=1, virtual_lights=100, diffuse_bounces=3,
                                 cache_accuracy=0.05)
@@ -58,6 +58,56 @@ def test_the_image_after_a_reload_is_the_same_to_the_bit(tmp_path: Any, glass: b
     values = second.values()
     assert values["resets"] == 0 and values["records"] == first.values()["records"]
     assert values["fill_rays"] < 0.2 * first.values()["fill_rays"] and values["update_rays"] == 0
+
+
+def test_short_rays_are_kept(tmp_path: Any) -> None:
+    settings = dict(light_compensation=8, light_bound=4.0)
+    first, path = Live(room(), **settings), str(tmp_path / "cache")
+    first.session.save_cache(path)
+    second = Live(room(), start=False, cache_verify=True, **settings)
+    second.session.load_cache(path)
+    assert np.array_equal(first.run(), second.run())
+    values = second.values()
+    assert values["resets"] == 0 and values["records"] == first.values()["records"] and values["verified_differing"] == 0
+
+
+def test_a_cache_of_other_settings_says_why_it_goes(tmp_path: Any) -> None:
+    first, path = Live(room()), str(tmp_path / "cache")
+    first.session.save_cache(path)
+    second = Live(room(), start=False, virtual_lights=50, light_compensation=2)
+    second.session.load_cache(path)
+    second.run()
+    (warning,) = second.session.statistics()["warnings"]
+    assert "Virtual Lights, Short Rays" in warning and second.values()["resets"] == 1
+    first.session.load_cache(path)
+    first.run()
+    assert not first.session.statistics()["warnings"]
+
+
+def painted_pane(**changes: Any) -> Description:
+    """A pane that lets through what its picture says, and a board of which a half is glass."""
+    scene = room()
+    scene.images["spots"] = noise_picture(changes.get("spots", 8))
+    coordinates = node("uv_map")
+    scene.materials["pane"] = node("mix_shader", fac=node("image_texture", {"image": "spots"}, vector=coordinates),
+                                   shader=diffuse((0.5, 0.5, 0.5)), shader_001=node("transparent_bsdf"))
+    scene.materials["clear"] = node("transparent_bsdf")
+    pane = quad((-0.9, 0.5, 0.4), (-0.2, 0.8, 0.4), (-0.2, 0.8, 1.2), (-0.9, 0.5, 1.2))
+    pane.uvs = changes.get("stretch", 1.0) * pane.uvs
+    scene.add("Pane", pane, "pane")
+    board = quad((0.9, 0.5, 0.4), (0.2, 0.8, 0.4), (0.2, 0.8, 1.2), (0.9, 0.5, 1.2))
+    board.slots = np.array(changes.get("slots", [0, 1]), np.uint16)
+    scene.add("Board", board, "white", "clear")
+    return scene
+
+
+@pytest.mark.parametrize("change", [{"spots": 9}, {"stretch": 2.0}, {"slots": [1, 0]}])
+def test_what_lets_light_through_elsewhere_is_another_scene(tmp_path: Any, change: dict[str, Any]) -> None:
+    path = str(tmp_path / "cache")
+    Live(painted_pane()).session.save_cache(path)
+    Live(painted_pane(), start=False).session.load_cache(path)
+    with pytest.raises(afterglow.InvalidInput, match="another scene"):
+        Live(painted_pane(**change), start=False).session.load_cache(path)
 
 
 def test_what_was_relit_meanwhile_is_repaired(tmp_path: Any) -> None:

@@ -4,24 +4,26 @@ cache. And how far settings go, what is forgotten, what lies on things that move
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from afterglow.scenes import look_at, rotate, scale, translate
-from afterglow.scenes.shapes import sphere
+from afterglow.scenes import Camera, Description, Light, look_at, node, rotate, scale, translate
+from afterglow.scenes.rooms import diffuse
+from afterglow.scenes.shapes import quad, sphere
 from test_instant_cache import Live, room
 
 # As native/methods/instant_cache/files.cpp writes them.
-FORMAT = 3
+FORMAT = 4
 HEADER = np.dtype([("magic", "S16"), ("format", "<u4"), ("slots", "<u4"), ("words", "<u4"), ("coloured", "<u4"),
                    ("records", "<u8"), ("scene", "<u8"), ("lengths", "<f4", 7), ("settings", "<u4", 8), ("update", "<u4"),
-                   ("unused", "<u4"), ("end", "<u4")])
+                   ("short_rays", "<u4"), ("end", "<u4")])
 LIGHT = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("face", "<f4", 3), ("rest", "<f4", 7), ("alive", "<u4")])
 RECORD = np.dtype([("instance", "<u4"), ("triangle", "<u4"), ("back", "<u4"), ("uv", "<f4", 2), ("position", "<f4", 3),
-                   ("normal", "<f4", 3), ("face", "<f4", 3), ("rest", "<f4", 25), ("measured", "<f4"), ("born", "<u4"),
+                   ("normal", "<f4", 3), ("face", "<f4", 3), ("rest", "<f4", 28), ("measured", "<f4"), ("born", "<u4"),
                    ("asked", "<u4"), ("rays", "<u4"), ("used", "<u4"), ("ready", "<u4"), ("wanted", "<u4")])
 
 
@@ -44,8 +46,8 @@ class Saved:
         slots, words = int(self.header["slots"][0]), int(self.header["words"][0])
         bits = np.arange(words * 64) < slots
         unknown = np.packbits(bits, bitorder="little").view("<u8")
-        rows = np.zeros((2, len(records), words), "<u8")  # seen, unknown
-        rows[1] = unknown
+        rows = np.zeros((3, len(records), words), "<u8")  # seen, unknown, facing
+        rows[1:] = unknown
         self.path.write_bytes(self.header.tobytes() + self.lights.tobytes() + records.tobytes() + rows.tobytes())
         return str(self.path)
 
@@ -176,6 +178,25 @@ def test_records_that_nobody_looks_at_are_forgotten(away: str) -> None:
     assert dropped(200) == dropped(201) and live.numbers()["records"] == seen
 
 
+def test_memory_has_a_limit() -> None:
+    """A long walk fills it: those unused for longest make room; and where one picture wants more, it is told."""
+    live = Live(room(), width=96, height=96, virtual_lights=256, cache_accuracy=0.01, cache_memory=1.0, cache_verify=False)
+    full = live.numbers()["cache_bytes"]
+    for step in range(30):
+        angle = 0.2 * step
+        live.built.description.camera.transform = look_at((0, 0, 1), (np.cos(angle), np.sin(angle), 1 + 0.3 * np.sin(3 * angle)))
+        live.edit(lambda: live.built.set_camera((96, 96), 0))
+        numbers = live.numbers()
+        full = max(full, numbers["cache_bytes"])
+    assert full <= 2**20 and numbers["records_dropped"] > 0 and numbers["resets"] == 1
+    assert live.image()[..., :3].max() > 0
+    live.session.update({"width": 400, "height": 400, "cache_accuracy": 1e-4})
+    live.run()
+    found = live.session.statistics()
+    assert found["values"]["records_refused"] > 0 and found["values"]["cache_bytes"] <= 2**20
+    assert any("is full" in text for text in found["warnings"])
+
+
 @pytest.mark.parametrize("length", [1 - 1e-6, 1 + 1e-6, 1 + 1e-5])
 def test_normals_that_are_rounded_longer_than_one(tmp_path: Path, length: float) -> None:
     """Their cosine with a point's may be above 1, and the root of what is missing to 1 no number."""
@@ -190,6 +211,30 @@ def test_normals_that_are_rounded_longer_than_one(tmp_path: Path, length: float)
         return live.image()
 
     assert np.abs(scaled(length) - scaled(1.0)).max() < 1e-3
+
+
+def test_a_clear_pane_takes_nothing_from_a_lamp_without_shadows(tmp_path: Path) -> None:
+    """Most beginnings miss the floor, and the lamp's light reaches what is behind things: its bounced light does not."""
+
+    def on_wall(pane: bool, pattern: int) -> float:
+        scene = Description("pane", Camera(look_at((0, -1.5, 0.8), (0, 0, 0)), math.radians(50)))
+        scene.materials.update(white=diffuse((0.8, 0.8, 0.8)), clear=node("transparent_bsdf"))
+        scene.add("Floor", quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)), "white")
+        scene.add("Wall", quad((-4, 4, 0), (4, 4, 0), (4, 4, 4), (-4, 4, 4)), "white")
+        if pane:
+            scene.add("Pane", quad((-4, 2, 0), (4, 2, 0), (4, 2, 4), (-4, 2, 4)), "clear")
+        scene.lights = [Light("L", "point", translate((0, 0, 0.8)), 100.0)]
+        live = Live(scene, start=False, virtual_lights=16384, light_pattern=pattern, cache_verify=False)
+        live.scene.set_light(live.built.lights["L"], cast_shadow=False)
+        live.run()
+        live.session.save_cache(str(tmp_path / "cache"))
+        raw = (tmp_path / "cache").read_bytes()
+        lights = np.frombuffer(raw, LIGHT, int(np.frombuffer(raw, HEADER, 1)["slots"][0]), HEADER.itemsize)
+        return float(lights["rest"][lights["position"][:, 1] > 3.9, 0].sum())
+
+    without, through = (np.array([on_wall(pane, pattern) for pattern in range(8)]) for pane in (False, True))
+    spread = math.hypot(*(values.std(ddof=1) / 8**0.5 for values in (without, through)))
+    assert abs(without.mean() - through.mean()) < 3 * spread < 0.04 * without.mean()
 
 
 def test_two_moving_objects_overlap() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
+from .. import backend
 from . import methods
 
 DENOISERS = [
@@ -216,12 +217,12 @@ def session_settings(scene: bpy.types.Scene, viewport: bool) -> dict[str, Any]:
         viewport=viewport,
         carry_over=own.carry_over,
     )
-    for name in methods._groups:
-        if name.upper() == own.method or own.method == "AUTO":
-            group = getattr(own, name)
-            keys = [key for key in group.__annotations__ if viewport or not methods.is_debug(key)]
-            settings.update({key: getattr(group, key) for key in keys})  # final renders show light, always
-    if viewport and own.carry_over and own.preview_short_rays and own.method in {"AUTO", "INSTANT_CACHE"}:
+    method = backend.chosen_method(own.method, viewport)
+    group = getattr(own, methods.group_name(method), None)
+    if group is not None:
+        keys = [key for key in group.__annotations__ if viewport or not methods.is_debug(key)]
+        settings.update({key: getattr(group, key) for key in keys})  # final renders show light, always
+    if viewport and own.carry_over and own.preview_short_rays and method == "INSTANT_CACHE":
         settings["light_compensation"] = max(settings.get("light_compensation", 0), own.preview_short_rays)
         settings["light_bound"] = max(settings.get("light_bound", 0.0), PREVIEW_BOUND)
         settings["virtual_lights"] = min(round(PREVIEW_LIGHTS * settings.get("virtual_lights", 256)), 65536)

@@ -78,7 +78,7 @@ class AFTERGLOW_RENDER_PT_sampling_cache(PropertiesPanel, bpy.types.Panel):
 
 def chosen_method(scene: bpy.types.Scene) -> str:
     """The method whose settings matter; of the engine's own choice, the viewport's."""
-    return "INSTANT_CACHE" if scene.afterglow.method == "AUTO" else scene.afterglow.method
+    return backend.chosen_method(scene.afterglow.method, True)
 
 
 def chosen_group(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:

@@ -93,7 +93,6 @@ bool Cache::covered(const CachePoint& p) const {
 }
 
 bool Cache::insert(const CommittedScene& scene, const CachePoint& p) {
-  if (records_.size() >= settings_.most_records) return false;
   Record record;
   record.place = place_of(scene.scene, p);
   if (!locate(scene.scene, record)) return false;
@@ -126,6 +125,7 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   std::vector<uint8_t> open;
   for (std::vector<uint32_t>& asked : rounds)
     while (!work.stop.stop()) {
+      const size_t most = most_records();
       open.assign(asked.size(), 0);
       parallel_blocks(asked.size(), 512, work.threads, [&](size_t begin, size_t end) {
         find_open(points, std::span(asked).subspan(begin, end - begin), open.data() + begin);
@@ -140,8 +140,10 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
       for (const uint32_t i : asked)
         if (covered(points[i]))
           asked[left++] = i;
-        else if (!insert(scene, points[i]))
+        else if (records_.size() >= most)
           counts_.refused++;
+        else
+          insert(scene, points[i]);
       asked.resize(left);
       if (records_.size() == first) break;
       std::vector<uint32_t> fresh(records_.size() - first);
@@ -265,6 +267,11 @@ Verification Cache::verify(const CommittedScene& scene, Work& work) const {
 size_t Cache::record_bytes() const {
   const size_t nearby = records_.empty() ? 0 : nearby_.bytes() / records_.size();
   return sizeof(Record) + 5 + visibility_.row_bytes() + nearby;
+}
+
+size_t Cache::most_records() const {
+  const size_t octree = records_.empty() ? 0 : octree_.bytes() / records_.size();
+  return settings_.most_bytes * 5 / (6 * (record_bytes() + octree));  // with room for more
 }
 
 size_t Cache::bytes() const {

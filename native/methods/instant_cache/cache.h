@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <span>
+#include <string>
 
 #include "methods/instant_cache/interpolation.h"
 #include "methods/instant_cache/moved.h"
@@ -23,14 +24,15 @@ struct CacheSettings {
   VirtualLightSettings lights;
   float accuracy = 0.05f;
   uint32_t keep_updates = 64;  // a record that answered nothing for so many updates is dropped; 0: never
-  uint32_t most_records = 1u << 20;
+  size_t most_bytes = size_t(1) << 30;
   bool on_demand = false;
 };
 
 struct CacheCounts {
   uint64_t path_rays = 0, fill_rays = 0, update_rays = 0, pairs_marked = 0, pairs = 0;
   uint64_t rays_now = 0;  // visibility rays since the last update began
-  uint64_t created = 0, updated = 0, reused = 0, moved = 0, dropped = 0, resets = 0, refused = 0;
+  uint64_t created = 0, updated = 0, reused = 0, moved = 0, dropped = 0, resets = 0;
+  uint64_t refused = 0;  // points that memory had no record for since the last update
   uint32_t lights = 0, lights_moved = 0, lights_recoloured = 0, objects_moved = 0;
   double seconds_lights = 0.0, seconds_update = 0.0, seconds_fill = 0.0, seconds_refine = 0.0;
 };
@@ -75,6 +77,8 @@ class Cache {
   size_t size() const { return records_.size(); }
   size_t bytes() const;
   size_t record_bytes() const;
+  /// Settings in which a loaded cache differs from those that it was wanted with, so that it had to go; or nothing.
+  const std::string& discarded() const { return discarded_; }
   /// As bytes (empty: there is nothing to save), and in place of what is remembered; InvalidInput for others' bytes.
   std::vector<char> save(const CommittedScene&) const;
   void load(const CommittedScene&, std::span<const char>);
@@ -95,6 +99,10 @@ class Cache {
   /// Whether the last frame was interrupted, told from how many records it asked.
   void look_back();
   void age();
+  /// Where memory is nearly full, the half of the records that answered longest ago goes.
+  void make_space();
+  size_t most_records() const;
+  void forget_others(const std::vector<uint32_t>& kept);
   void keep(const std::vector<uint32_t>& kept);
   void rebuild_octree();
   void note_use(uint32_t record) const;
@@ -125,6 +133,7 @@ class Cache {
   bool stale_ = true;    // nothing that is kept may be used
   bool lazy_ = false;    // short rays wait for refine()
   bool loaded_ = false;  // came from a file: the lights have to be compared
+  std::string discarded_;
   Spacing spacing_;
   LightEmission emission_;
   Viewpoint viewpoint_;  // that the lights were traced for

@@ -47,9 +47,18 @@ bool same_walk(const WalkLimits& a, const WalkLimits& b) {
 
 void Cache::configure(const CacheSettings& settings) {
   const CacheSettings& o = settings_;
-  stale_ |= !same_walk(settings.walk.limits, o.walk.limits) || settings.lights.count != o.lights.count ||
-            settings.lights.pattern != o.lights.pattern || settings.lights.bound != o.lights.bound ||
-            settings.lights.short_rays != o.lights.short_rays || settings.accuracy != o.accuracy;
+  std::string other;
+  const auto compare = [&](bool same, const char* name) {
+    if (!same) other += (other.empty() ? "" : ", ") + std::string(name);
+  };
+  compare(same_walk(settings.walk.limits, o.walk.limits), "Light Paths");
+  compare(settings.lights.count == o.lights.count, "Virtual Lights");
+  compare(settings.lights.pattern == o.lights.pattern, "Pattern");
+  compare(settings.lights.bound == o.lights.bound, "Bound");
+  compare(settings.lights.short_rays == o.lights.short_rays, "Short Rays");
+  compare(settings.accuracy == o.accuracy, "Interpolation");
+  stale_ |= !other.empty();
+  if (loaded_) discarded_ = other;
   settings_ = settings;
   spacing_ = spacing_of(settings.accuracy);
 }
@@ -82,6 +91,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
   shown_ = shown, center_ = center, radius_ = radius;
   look_back();
   update_++;
+  make_space();
   const bool all = stale_;
   if (all) {
     reset(scene);
@@ -89,7 +99,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
     if (coloured != visibility_.coloured()) visibility_.set_coloured(coloured), forget_sums();
     if (scaled) rebuild_octree();
   }
-  counts_.rays_now = 0;
+  counts_.rays_now = counts_.refused = 0;
   SceneChanges seen = changes;
   seen.camera = false;
   counts_.updated = counts_.reused = counts_.moved = counts_.created = 0;
@@ -144,6 +154,7 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
       records_[i].ready = false;
       if (was_used(i)) waiting.push_back(i);  // the others wait until somebody wants them
     } else if (recoloured) {
+      records_[i].ready = false;  // whatever stops the sums
       dimmed.push_back(i);
     } else {
       counts_.reused++;
@@ -321,9 +332,8 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
     for (const bool old : {true, false})
       if (const Bounds& bounds = old ? m.before : m.after; bounds.present())
         places.push_back({Crossing(bounds, 2.0f * (lift + error), lights_), old});
-  const bool solid = shown_.empty() && std::all_of(moved.begin(), moved.end(), [](const Moved& m) {
-                       return m.opaque_now || !m.after.present();
-                     });
+  const bool solid = shown_.empty() && std::all_of(moved.begin(), moved.end(),
+                                                   [](const Moved& m) { return m.opaque_now || !m.after.present(); });
   only_moved_.assign(solid ? records_.size() * words : 0, 0);
   parallel_blocks(order.size(), kGroup, work.threads, [&](size_t begin, size_t end) {
     Box around;
@@ -400,6 +410,21 @@ void Cache::age() {
   std::vector<uint32_t> kept;
   for (uint32_t i = 0; i < records_.size(); ++i)
     if (update_ - used_[i] <= settings_.keep_updates + interrupted_) kept.push_back(i);
+  forget_others(kept);
+}
+
+void Cache::make_space() {
+  const size_t most = most_records();
+  if (records_.size() < most - most / 8) return;
+  std::vector<uint32_t> last = used_;
+  std::nth_element(last.begin(), last.begin() + std::ptrdiff_t(last.size() / 2), last.end());
+  std::vector<uint32_t> kept;
+  for (uint32_t i = 0; i < records_.size(); ++i)
+    if (was_used(i) || used_[i] > last[last.size() / 2]) kept.push_back(i);
+  forget_others(kept);
+}
+
+void Cache::forget_others(const std::vector<uint32_t>& kept) {
   if (kept.size() == records_.size()) return;
   counts_.dropped += records_.size() - kept.size();
   keep(kept);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A cache as bytes: a header of plain numbers in the machine's order, the virtual lights, the records, what each of
 // them sees. The scene's fingerprint holds what visibility depends on: places and forms of objects, and materials that
-// let light through. Colours and lamps may differ: the first update after a load compares the lights as after any edit.
+// let light through, with their pictures and coordinates. Colours and lamps may differ: the first update after a load
+// compares the lights as after any edit.
 #include <cstring>
 #include <type_traits>
 
@@ -13,7 +14,7 @@ namespace afterglow::instant_cache {
 namespace {
 
 constexpr char kMagic[16] = "afterglow icach";
-constexpr uint32_t kFormat = 3;
+constexpr uint32_t kFormat = 4;
 
 /// FNV-1a over the bytes of plain values.
 class Fingerprint {
@@ -37,7 +38,15 @@ class Fingerprint {
   uint64_t value_ = 0xcbf29ce484222325ull;
 };
 
-void add_graph(Fingerprint& f, const Graph& graph) {
+void add_image(Fingerprint& f, const Image& image) {
+  f.add(image.colorspace), f.add(image.alpha);
+  for (const auto& [tile, source] : image.tiles) {
+    f.add(tile), f.add(source->path), f.add(source->width), f.add(source->height), f.add(source->channels);
+    f.add(source->encoded), f.add(source->pixels), f.add(source->byte_pixels);
+  }
+}
+
+void add_graph(Fingerprint& f, const Scene& scene, const Graph& graph) {
   const auto add_link = [&](const Link& link) { f.add(link.node), f.add(link.output); };
   for (const Node& node : graph.nodes) {
     f.add(node.type);
@@ -49,6 +58,11 @@ void add_graph(Fingerprint& f, const Graph& graph) {
     }
     for (const auto& [name, param] : node.params) {
       f.add(name);
+      const int64_t* image = name == "image" ? std::get_if<int64_t>(&param) : nullptr;
+      if (image && *image > 0) {  // its handle says nothing
+        add_image(f, scene.image(Handle(*image)));
+        continue;
+      }
       std::visit(
           [&](const auto& value) {
             if constexpr (!std::is_same_v<std::decay_t<decltype(value)>, std::monostate>) f.add(value);
@@ -69,14 +83,23 @@ uint64_t fingerprint(const CommittedScene& committed) {
     for (const Vec3* column : {&record.to_world.x, &record.to_world.y, &record.to_world.z, &record.to_world.p})
       f.add(*column);
     f.add(record.visibility & kVisibleDiffuse);
-    f.add(record.mesh->positions), f.add(record.mesh->triangles);
+    const Mesh& mesh = *record.mesh;
+    f.add(mesh.positions), f.add(mesh.triangles), f.add(mesh.smooth), f.add(mesh.slots);
+    f.add(mesh.corners), f.add(mesh.corner_normals), f.add(mesh.vertex_normals);
+    bool clear = false;
     for (uint32_t s = 0; s < record.slot_count; ++s) {
       const uint32_t material = scene.material_slots()[record.first_material + s];
       const bool opaque = committed.materials.opaque(material);
       f.add(opaque);
       const Handle handle = scene.material_handles()[material];
-      if (!opaque && handle) add_graph(f, scene.material(handle).graph);
+      if (!opaque && handle) add_graph(f, scene, scene.material(handle).graph), clear = true;
     }
+    if (!clear) continue;  // else where it lets how much through may depend on all of this
+    for (const UvMap& map : mesh.uvs) f.add(map.name), f.add(map.values);
+    for (const Attribute& attribute : mesh.attributes) f.add(attribute.name), f.add(attribute.values);
+    f.add(mesh.active_uv), f.add(mesh.active_color);
+    f.add(record.object_index), f.add(record.random);
+    for (int i = 0; i < 4; ++i) f.add(record.color[i]);
   }
   return f.value();
 }
@@ -86,7 +109,7 @@ struct Header {
   uint32_t format, slots, words, coloured;
   uint64_t records, scene;
   float center[3], radius, bound, accuracy, light_bound;
-  uint32_t count, pattern, max_bounces, diffuse, glossy, transmission, transparent, caustics, update, unused;
+  uint32_t count, pattern, max_bounces, diffuse, glossy, transmission, transparent, caustics, update, short_rays;
 };
 static_assert(sizeof(Header) == 16 + 16 + 16 + 28 + 40 + 4);
 
@@ -96,7 +119,7 @@ struct SavedLight {
 };
 struct SavedRecord {
   uint32_t instance, triangle, back;
-  float u, v, numbers[34];
+  float u, v, numbers[37];
   float measured;
   uint32_t born, asked, rays, used, ready, wanted;
 };
@@ -131,7 +154,8 @@ SavedRecord saved(const Record& r, uint32_t used, uint8_t wanted) {
   for (const Vec3* v : {&r.position, &r.normal, &r.face_normal, &r.irradiance}) put(at, *v);
   for (const glm::mat3* m : {&r.by_step, &r.by_turn})
     for (int i = 0; i < 3; ++i) put(at, (*m)[i]);
-  *at++ = r.error, *at++ = r.footprint, *at++ = r.reach, *at = r.radius;
+  *at++ = r.error, *at++ = r.footprint, *at++ = r.reach, *at++ = r.radius;
+  put(at, r.compensation);
   s.measured = r.measured, s.born = r.born, s.asked = r.asked, s.rays = r.rays;
   s.used = used, s.ready = r.ready, s.wanted = wanted;
   return s;
@@ -144,7 +168,8 @@ Record restored(const SavedRecord& s) {
   for (Vec3* v : {&r.position, &r.normal, &r.face_normal, &r.irradiance}) *v = take(at);
   for (glm::mat3* m : {&r.by_step, &r.by_turn})
     for (int i = 0; i < 3; ++i) (*m)[i] = take(at);
-  r.error = *at++, r.footprint = *at++, r.reach = *at++, r.radius = *at;
+  r.error = *at++, r.footprint = *at++, r.reach = *at++, r.radius = *at++;
+  r.compensation = take(at);
   r.measured = s.measured, r.born = s.born, r.asked = s.asked, r.rays = s.rays;
   r.ready = s.ready != 0;
   return r;
@@ -173,7 +198,7 @@ std::vector<char> Cache::save(const CommittedScene& scene) const {
   const WalkLimits& l = settings_.walk.limits;
   h.max_bounces = l.max_bounces, h.diffuse = l.diffuse, h.glossy = l.glossy, h.transmission = l.transmission;
   h.transparent = l.transparent, h.caustics = uint32_t(l.caustics_reflective) | uint32_t(l.caustics_refractive) << 1;
-  h.update = update_;
+  h.update = update_, h.short_rays = settings_.lights.short_rays;
   std::vector<char> bytes(sizeof(h));
   std::memcpy(bytes.data(), &h, sizeof(h));
   const auto append = [&](const auto& value) {
@@ -197,15 +222,16 @@ void Cache::load(const CommittedScene& scene, std::span<const char> bytes) {
   const auto damaged = [] { return InvalidInput("this saved instant cache is damaged"); };
   CacheSettings settings = settings_;
   settings.lights.count = h.count, settings.lights.pattern = h.pattern, settings.lights.bound = h.light_bound;
-  settings.accuracy = h.accuracy;
+  settings.accuracy = h.accuracy, settings.lights.short_rays = h.short_rays;
   WalkLimits& l = settings.walk.limits;
   l.max_bounces = h.max_bounces, l.diffuse = h.diffuse, l.glossy = h.glossy, l.transmission = h.transmission;
   l.transparent = h.transparent, l.caustics_reflective = h.caustics & 1u, l.caustics_refractive = h.caustics & 2u;
   const uint32_t slots = plan_slots(h.count, settings.lights.options(l, 0).bounces).slots;
-  if (h.slots != slots || h.words != (slots + 63) / 64 || h.coloured > 1 || h.records > (uint64_t(1) << 32))
+  if (h.slots != slots || h.words != (slots + 63) / 64 || h.coloured > 1 || h.records > (uint64_t(1) << 32) ||
+      h.short_rays > VirtualLightSettings::kMostShortRays)
     throw damaged();
   const size_t fixed = sizeof(h) + h.slots * sizeof(SavedLight), rest = bytes.size() - std::min(bytes.size(), fixed);
-  const size_t row = size_t(h.words) * 16 + (h.coloured ? size_t(h.slots) * 2 : 0);
+  const size_t row = size_t(h.words) * 24 + (h.coloured ? size_t(h.slots) * 2 : 0);
   if (bytes.size() < fixed || rest % (sizeof(SavedRecord) + row) || rest / (sizeof(SavedRecord) + row) != h.records)
     throw InvalidInput("this saved instant cache is cut off");
 
@@ -227,6 +253,7 @@ void Cache::load(const CommittedScene& scene, std::span<const char> bytes) {
     if (!sound(scene.scene, s)) throw damaged();
     records[i] = restored(s), used[i] = s.used, wanted[i] = uint8_t(s.wanted != 0);
   }
+  loaded_ = false;
   configure(settings);
   center_ = Vec3(h.center[0], h.center[1], h.center[2]), radius_ = h.radius, bound_ = h.bound, update_ = h.update;
   shown_.clear();
@@ -244,7 +271,7 @@ void Cache::load(const CommittedScene& scene, std::span<const char> bytes) {
   placement_.update(scene, everything);
   counts_ = CacheCounts{};
   stale_ = false;
-  loaded_ = true;
+  loaded_ = true, discarded_.clear();
 }
 
 }  // namespace afterglow::instant_cache

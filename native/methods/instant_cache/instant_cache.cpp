@@ -39,6 +39,7 @@ class InstantCache final : public IndirectMethod {
       if (name == "cache_accuracy") s.accuracy = float(number_of(value));
       if (name == "cache_first") first_ = uint32_t(integer_of(value));
       if (name == "cache_keep") s.keep_updates = uint32_t(integer_of(value));
+      if (name == "cache_memory") s.most_bytes = size_t(number_of(value) * 1048576.0);
       if (name == "cache_on_demand") s.on_demand = integer_of(value) != 0;
       if (name == "cache_verify") verify_ = integer_of(value) != 0;
       if (name == "cache_view") view_ = view_of(value);
@@ -79,7 +80,7 @@ class InstantCache final : public IndirectMethod {
     add("records_moved", double(c.moved));
     add("records_dropped", double(c.dropped));
     add("resets", double(c.resets));
-    add("refused", double(c.refused));
+    add("records_refused", double(c.refused));
     add("virtual_lights", double(c.lights));
     add("lights_moved", double(c.lights_moved));
     add("lights_recoloured", double(c.lights_recoloured));
@@ -99,6 +100,14 @@ class InstantCache final : public IndirectMethod {
       add("verified_differing", double(verification_.differing));
       add("verified_worst", verification_.worst);
     }
+    if (c.refused)
+      s.warnings.push_back("the instant cache is full: " + std::to_string(c.refused) +
+                           " places of this picture get no bounced light. More memory (cache_memory) or a larger "
+                           "Interpolation (cache_accuracy) "
+                           "brings it back");
+    if (!cache_.discarded().empty())
+      s.warnings.push_back("the loaded instant cache was made with other settings (" + cache_.discarded() +
+                           "): it was filled anew");
     return s;
   }
 
@@ -119,7 +128,7 @@ MethodDescription describe() {
   d.description =
       "Bounced light from virtual point lights, remembered at sparse places and repaired after every edit. No caustics "
       "on diffuse surfaces that are seen directly; corners are too dark without short rays; some light passes beneath "
-      "thin partitions";
+      "thin partitions; emitters that are left out of light sampling light nothing; at most 64 diffuse bounces";
   VirtualLightSettings::describe(d.settings);
   d.settings.push_back(
       {"cache_accuracy", "Interpolation",
@@ -132,6 +141,9 @@ MethodDescription describe() {
   d.settings.push_back({"cache_keep", "Keep Unused",
                         "Updates after which a record that no pixel used is forgotten; 0: never", "", int64_t(64), 0.0,
                         1e6});
+  d.settings.push_back({"cache_memory", "Memory",
+                        "Records that answered longest ago make room for new ones when memory is nearly full", "MiB",
+                        1024.0, 1.0, 1048576.0});
   d.settings.push_back({"cache_on_demand", "Repair on Demand",
                         "Repairs only the records that the image asks for, when it asks for them", "", false, 0.0,
                         1.0});

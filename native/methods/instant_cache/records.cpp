@@ -121,7 +121,7 @@ void VisibilityTable::write(std::vector<char>& bytes) const {
     const char* at = reinterpret_cast<const char*>(values.data());
     bytes.insert(bytes.end(), at, at + count * sizeof(values[0]));
   };
-  append(seen_, rows_ * words_), append(unknown_, rows_ * words_);
+  append(seen_, rows_ * words_), append(unknown_, rows_ * words_), append(facing_, rows_ * words_);
   if (coloured_) append(transmittance_, rows_ * slots_);
 }
 
@@ -132,8 +132,7 @@ void VisibilityTable::read(size_t rows, const char* from) {
     if (count) std::memcpy(values.data(), from, count * sizeof(values[0]));
     from += count * sizeof(values[0]);
   };
-  take(seen_, rows_ * words_), take(unknown_, rows_ * words_);
-  facing_.assign(rows_ * words_, ~uint64_t(0));  // until they are asked
+  take(seen_, rows_ * words_), take(unknown_, rows_ * words_), take(facing_, rows_ * words_);
   if (coloured_) take(transmittance_, rows_ * slots_);
   if (slots_ % 64)
     for (size_t row = 0; row < rows_; ++row)  // no bit beyond the slots, whatever the file says
