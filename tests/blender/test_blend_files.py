@@ -11,7 +11,7 @@ import pytest
 
 
 @pytest.mark.parametrize("name", ["wobbling_cylinder", "kite", "bouncing_bunnies", "desk_with_chair", "spheres",
-                                  "cornell_statue"])
+                                  "cornell_statue", "conference_room", "pillared_hall", "office_with_blinds"])
 def test_motion_in_the_file_is_that_of_the_scene(in_blender: Callable[..., dict[str, Any]], blend_files: Path, name: str) -> None:
     found = in_blender(
         f"""
@@ -21,12 +21,15 @@ def test_motion_in_the_file_is_that_of_the_scene(in_blender: Callable[..., dict[
             bpy.context.scene.frame_set(frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
             for item in made.objects:
-                mesh, thing = made.meshes[item.mesh], bpy.data.objects[item.name].evaluated_get(depsgraph)
-                points = np.empty(3 * len(thing.data.vertices), np.float32)
-                thing.data.vertices.foreach_get("co", points)
-                wanted = mesh.positions if mesh.deform is None else mesh.deform(frame)
-                off = max(off, float(abs(points.reshape(-1, 3) - wanted).max()),
-                          float(abs(np.array(thing.matrix_world) - item.at(frame)[0]).max()))
+                mesh, places = made.meshes[item.mesh], item.at(frame)
+                for i, place in enumerate(places, 1):
+                    name = item.name if len(places) == 1 else f"{{item.name}} {{i}}"
+                    thing = bpy.data.objects[name].evaluated_get(depsgraph)
+                    points = np.empty(3 * len(thing.data.vertices), np.float32)
+                    thing.data.vertices.foreach_get("co", points)
+                    wanted = mesh.positions if mesh.deform is None else mesh.deform(frame)
+                    off = max(off, float(abs(points.reshape(-1, 3) - wanted).max()),
+                              float(abs(np.array(thing.matrix_world) - place).max()))
                 checked += mesh.deform is not None or item.move is not None
         result(off=off, checked=checked)
         """,

@@ -31,9 +31,12 @@ def test_frames_from_the_command_line(blender: Callable[..., Any], in_blender: R
     assert len({picture.read_bytes() for picture in pictures}) == 3
 
 
-def test_persistent_data_changes_no_pixel(in_blender: Run) -> None:
+@pytest.mark.parametrize("method", ["PATH_TRACING", "INSTANT_RADIOSITY"])
+def test_persistent_data_changes_no_pixel(in_blender: Run, method: str) -> None:
+    """Of methods that remember nothing between frames."""
     found = in_blender(
         MOVING
+        + f"s.afterglow.method = {method!r}"
         + """
 differences, kept = [], []
 for frame in (1, 2, 3, 1):

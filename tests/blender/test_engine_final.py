@@ -18,22 +18,23 @@ def box(blend_files: Path) -> Path:
     return blend_files / "cornell_box.blend"
 
 
-def test_picture_and_statistics(in_blender: Run, box: Path) -> None:
+@pytest.mark.parametrize("method", ["PATH_TRACING", "INSTANT_RADIOSITY", "INSTANT_CACHE", "HASH_CACHE"])
+def test_picture_and_statistics(in_blender: Run, box: Path, method: str) -> None:
     found = in_blender(
-        """
+        f"""
         import afterglow
-        s = scene(samples=16)
+        s = scene(samples=16, method={method!r})
         picture = render()
         stats = afterglow.statistics(s)
         result(finite=bool(np.isfinite(picture).all()), least=picture.min(), mean=picture[..., :3].mean(),
-               spread=picture[..., :3].std(), stats={k: stats[k] for k in ('method', 'samples', 'threads', 'dropped')},
+               spread=picture[..., :3].std(), stats={{k: stats[k] for k in ('method', 'samples', 'threads', 'dropped')}},
                seconds=stats['seconds'], rays=stats['rays'], wall=stats['wall_time'])
         """,
         box,
     )
     assert found["finite"] and found["least"] >= 0
     assert found["mean"] > 0.02 and found["spread"] > 0.02
-    assert found["stats"]["method"] == "PATH_TRACING" and found["stats"]["samples"] == 16
+    assert found["stats"]["method"] == method and found["stats"]["samples"] == 16
     assert {"sync", "commit"} <= set(found["seconds"]) and found["wall"] >= found["seconds"]["sync"]
     assert sum(found["rays"].values()) > 96 * 64 * 16
 

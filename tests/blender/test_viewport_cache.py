@@ -61,6 +61,37 @@ def test_the_viewport_keeps_its_cache_over_switches_and_edits(in_window: Run, bl
     assert "Traceback" not in found["output"], found["output"][-3000:]
 
 
+def test_the_viewport_follows_an_edit_by_instant_radiosity(in_window: Run, blend_files: Path) -> None:
+    """The method that remembers nothing: each state's picture is its own, and coming back shows the first again."""
+    found = in_window(
+        """
+        s = scene()
+        s.afterglow.method = 'INSTANT_RADIOSITY'
+        s.afterglow.preview_accuracy, s.afterglow.preview_samples = 0.0, 4
+        s.render.preview_pixel_size = '4'
+        box, seen = s.objects['Tall'], []
+
+        def look():
+            seen.append(viewport().session.statistics()['method'])
+            return view_picture().copy()
+
+        def steps():
+            full_view(); yield 1.0
+            yield from settled(); first = look()
+            box.location.x += 0.2; yield 0.1
+            yield from settled(); moved = look()
+            box.location.x -= 0.2; yield 0.1
+            yield from settled(); back = look()
+            result(seen=seen, light=first.mean(), moved=np.abs(moved - first).mean(), back=np.abs(back - first).mean())
+        drive(steps)
+        """,
+        blend_files / "cornell_box.blend",
+    )
+    assert "Traceback" not in found["output"], found["output"][-3000:]
+    assert found["seen"] == ["INSTANT_RADIOSITY"] * 3
+    assert found["light"] > 0.05 and found["moved"] > 0.005 and found["back"] < 0.1 * found["moved"], found
+
+
 def test_frames_of_an_animation_share_a_cache(in_blender: Run, blend_files: Path) -> None:
     found = in_blender(
         """

@@ -4,6 +4,7 @@
 import json
 import math
 import os
+import statistics
 from pathlib import Path
 
 import numpy as np
@@ -125,13 +126,69 @@ def test_tables_and_charts_take_the_newest_of_several_runs(tmp_path: Path, monke
 def test_tables_have_the_papers_numbers_beside_ours() -> None:
     stages = {kind: {"update": 0.1 * n, "fill": 0.0, "interpolate": 0.0, "filter": 0.0, "walk": 0.1, "film": 0.0}
               for n, kind in enumerate(("TIC", "IC", "IGI"), 1)}
+    whitted = {"traced": [0.5, 0.4, 0.3], "own": [0.3, 0.2, 0.8]}
     figures = [{"figure": "diffuse part, TIC over IGI", "scene": "desk_with_chair", "value": 0.1, "details": {"stages": stages}},
                {"figure": "diffuse part of the first frame, IC over IGI", "scene": "desk_with_chair", "value": 0.1,
-                "details": {"stages": {kind: [found] for kind, found in stages.items()}}},
+                "details": {"stages": {kind: [found] for kind, found in stages.items()}, "whitted": whitted}},
+               {"figure": "whole frame, TIC over Whitted", "scene": "desk_with_chair", "value": 0.1,
+                "details": {"whitted": {kind: [time / 2 for time in times] for kind, times in whitted.items()}}},
                {"figure": "pixels with FLIP above 0.1, IC against IGI", "scene": "desk_with_chair", "value": 3.5, "details": {}}]
     text = tables.tables(figures)
-    for number in ("3.62", "9.33", "6.82", "18.67", "2.11"):
+    for number in ("3.62", "9.33", "6.82", "18.67", "2.11", "0.07", "12.33"):
         assert number in text, (number, text)
+    first, _, third, *_ = text.split("\n\nTable")
+    assert "desk_with_chair  0.30  " in first and "desk_with_chair  6.67  " in third, text  # of two ways the faster
+
+
+@pytest.mark.parametrize("name", ["conference_room", "pillared_hall"])
+def test_animations_of_the_large_rooms_stand_beside_the_papers(name: str) -> None:
+    from afterglow.bench.instant_cache import animations, paper
+
+    assert name in animations.ONE_MOVES and animations.MOVING[name].moving and name in paper.WHOLE_MOVING
+    assert "office_with_blinds" in animations.ONE_MOVES and animations.MOVING["office_with_blinds"].paper(0, 2) is None
+
+
+def test_a_whole_frame_is_judged_by_the_faster_rival(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    from afterglow.bench.instant_cache import animations, watched
+
+    monkeypatch.setattr(animations, "MOVING", {})
+    monkeypatch.setattr(watched, "SETTINGS", {**watched.SETTINGS, "width": 48, "height": 32})
+    [figure] = animations.whole_frame(Context(tmp_path, pairs=1))
+    middles = {kind: statistics.median(times) for kind, times in figure.details["whitted"].items()}
+    assert set(middles) == {animations.TRACED, animations.OWN}
+    assert figure.peer_value == min(middles.values()) == middles[figure.peer]
+    assert all(f"{seconds:.4f}" in figure.note for seconds in middles.values())
+
+
+def test_rays_that_an_edit_can_change_are_counted_both_ways() -> None:
+    """Those that cross what moved or end at a changed light are among those that count records on what moves besides."""
+    from afterglow import scenes
+    from afterglow.bench.instant_cache.rays import needed, saved
+    from afterglow.bench.instant_cache.watched import Watched
+
+    watched = Watched(lambda: scenes.make("desk_with_chair"), "INSTANT_CACHE", width=60, height=40, virtual_lights=32)
+    before = saved(watched)
+    watched.move_to(2.0)
+    strict, wide = needed(watched, before, saved(watched), (1.0, 2.0))
+    assert 0 < strict < wide
+
+
+def test_a_reference_is_of_one_state_of_a_scene() -> None:
+    from afterglow import scenes
+    from afterglow.bench.instant_cache.quality import fingerprint
+
+    one, again, moved, painted = (scenes.make("cornell_box") for _ in range(4))
+    moved.objects[-1].transforms = moved.objects[-1].transforms + 0.01
+    painted.materials["red"].inputs["color"] = (0.1, 0.2, 0.3)
+    assert fingerprint(one) == fingerprint(again)
+    assert len({fingerprint(it) for it in (one, moved, painted)}) == 3
+
+
+def test_what_has_no_goal_is_not_judged() -> None:
+    beside = Figure("f", "s", 3.0, "%", note="beside")
+    assert beside.verdict() == "" and "MISSED" not in beside.line() and beside.holds is None
+    assert Figure("f", "s", holds=False).verdict() == "NO" and Figure("f", "s", 1.0, goal="≤ 2").judged().verdict() == "yes"
+    assert "NO" not in table([beside])
 
 
 def test_charts_of_the_hash_cache_are_drawn_from_what_was_measured() -> None:

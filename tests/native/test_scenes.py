@@ -60,6 +60,19 @@ def test_deforming_meshes_keep_their_triangles() -> None:
     assert one.shape == two.shape == mesh.positions.shape and np.abs(one - two).max() > 0.01
 
 
+@pytest.mark.parametrize(("name", "moves"), [("conference_room", "Bunny"), ("pillared_hall", "Box"),
+                                             ("office_with_blinds", "Rolling chair")])
+def test_one_thing_moves_through_each_large_room(name: str, moves: str) -> None:
+    """In every one of its 100 frames, and nothing else does."""
+    scene = scenes.make(name)
+    assert scene.frames == (1, 100)
+    [item] = [item for item in scene.objects if item.move is not None]
+    assert item.name == moves
+    places = np.array([item.at(frame)[0] for frame in range(1, 101)])
+    assert (np.abs(np.diff(places, axis=0)).max((1, 2)) > 1e-5).all()
+    assert np.ptp(places[:, :3, 3], axis=0).max() > 0.5
+
+
 def test_scaled_and_moved_scenes() -> None:
     scene = scenes.make("cornell_box")
     large, far = scene.scaled(1e4), scene.moved((1e5, 0, 0))

@@ -131,8 +131,9 @@ def main(arguments: Any) -> int:
         start = time.perf_counter()
         figures = run(name, context, keys[name], lambda so_far, file=file: write(file, so_far, folder, about))  # type: ignore[misc]
         print(table(figures))
-        missing = [figure for figure in figures if figure.holds is not True]
-        print(f"{len(figures) - len(missing)} of {len(figures)} hold; {clock(time.perf_counter() - start)}; "
+        judged = [figure for figure in figures if figure.verdict()]
+        missing = [figure for figure in judged if figure.holds is not True]
+        print(f"{len(judged) - len(missing)} of {len(judged)} hold; {clock(time.perf_counter() - start)}; "
               f"{folder / file}.json, .svg")
         missed |= bool(missing)
     return int(missed)

@@ -61,6 +61,10 @@ class Figure:
         actual, margin = self.ratio if self.ratio is not None else self.value, self.margin()
         return self.spread / actual * margin if self.spread and actual and margin else None
 
+    def verdict(self) -> str:
+        """"" for what has no goal, and stands beside another figure."""
+        return "yes" if self.holds else "" if self.holds is None and not self.goal else "NO"
+
     def title(self) -> str:
         return f"{self.figure}{', ' + self.scene if self.scene else ''}"
 
@@ -68,7 +72,8 @@ class Figure:
         actual = self.ratio if self.ratio is not None else self.value
         shown = "–" if actual is None else f"{actual:.4g}"
         spread = f" ± {self.spread:.2g}" if self.spread else ""
-        return f"{self.title()}: {shown}{spread} (goal {self.goal or '–'}) {'holds' if self.holds else 'MISSED ' + self.note}"
+        verdict = {"yes": "holds", "": self.note, "NO": f"MISSED {self.note}"}[self.verdict()]
+        return f"{self.title()}: {shown}{spread} (goal {self.goal or '–'}) {verdict}"
 
 
 @dataclass
@@ -128,7 +133,7 @@ def table(figures: list[Figure]) -> str:
         ratio = "" if f.ratio is None else chart.number(f.ratio) + spread
         value = "" if f.value is None else f"{chart.number(f.value)} {f.unit}" + ("" if f.ratio is not None else spread)
         peer = "" if f.peer_value is None else f"{chart.number(f.peer_value)} ({f.peer})"
-        rows.append((f.figure, f.scene, value, peer, ratio, f.goal, "yes" if f.holds else "NO"))
+        rows.append((f.figure, f.scene, value, peer, ratio, f.goal, f.verdict()))
     notes = [f"  {f.title()}: {f.note}" for f in figures if f.note]
     return chart.table(rows) + ("\n\n" + "\n".join(notes) if notes else "") + "\n"
 

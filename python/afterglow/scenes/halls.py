@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Large rooms of many triangles: a hall of fluted pillars, an office behind blinds, a conference room."""
+"""Large rooms of many triangles: a hall of fluted pillars, an office behind blinds, a conference room. In each one thing moves
+for 100 frames, as in the animations of Debattista et al. 2009 (a box in Sibenik, a bunny on the table of Conference)."""
 
 from __future__ import annotations
 
@@ -10,7 +11,14 @@ import numpy as np
 
 from .description import Camera, Description, Light, Matrix, Object, look_at, node, rotate, scale, translate
 from .rooms import background, diffuse, emission
-from .shapes import box, cylinder, grid, join, lathe, quad, sphere, statue, transformed
+from .shapes import box, bunny, cylinder, grid, join, lathe, quad, sphere, statue, transformed
+
+FRAMES = (1, 100)
+
+
+def _share(frame: float) -> float:
+    """How much of the motion has gone by: 0 in the first frame, 1 in the last, going on at the same speed beyond."""
+    return (frame - FRAMES[0]) / (FRAMES[1] - FRAMES[0])
 
 
 def _fluted_pillar(height: float = 4.0, flutes: int = 20, rings: int = 24) -> Any:
@@ -26,12 +34,14 @@ def _fluted_pillar(height: float = 4.0, flutes: int = 20, rings: int = 24) -> An
 
 
 def pillared_hall(rows: int = 10) -> Description:
-    """Two rows of fluted pillars under a vault, light from one side and a skylight: about 80,000 triangles."""
+    """Two rows of fluted pillars under a vault, light from one side and a skylight: about 80,000 triangles. A yellow box slides
+    across the nave, turning, from between two pillars to those on the other side."""
     length = 2.4 * rows
     scene = Description("pillared_hall",
                         Camera(look_at((0.6, -length / 2 + 0.8, 1.7), (-0.3, length / 2, 1.6)), math.radians(70)),
-                        resolution=(300, 200))
-    scene.materials.update(stone=diffuse((0.7, 0.65, 0.55)), floor=diffuse((0.5, 0.4, 0.35)), lamp=emission(30.0, (1, 0.9, 0.75)))
+                        frames=FRAMES, resolution=(300, 200))
+    scene.materials.update(stone=diffuse((0.7, 0.65, 0.55)), floor=diffuse((0.5, 0.4, 0.35)), lamp=emission(30.0, (1, 0.9, 0.75)),
+                           yellow=diffuse((0.75, 0.6, 0.06)))
     scene.meshes["Pillar"] = _fluted_pillar()
     places = [translate((x, (i + 0.5) * 2.4 - length / 2, 0)) for i in range(rows) for x in (-1.8, 1.8)]
     scene.objects.append(Object("Pillar", "Pillar", np.array(places), ("stone",)))
@@ -47,15 +57,21 @@ def pillared_hall(rows: int = 10) -> Description:
     scene.add("Vault", vault, "stone")
     scene.add("Statue", statue(40, 60), "stone", transform=translate((0, length / 4, 0)) @ scale(2.2))
     scene.add("Lamp", quad((-0.5, -1, 5), (-0.5, 1, 5), (0.5, 1, 5), (0.5, -1, 5)), "lamp")
+
+    def slide(frame: float) -> Matrix:
+        at = _share(frame)
+        return translate((-1.8 + 3.2 * at, 2 * 2.4 - length / 2, 0.01)) @ rotate(0.4 + 1.2 * at)
+
+    scene.add("Box", box((-0.3, -0.3, 0), (0.3, 0.3, 1.2)), "yellow", move=slide)
     scene.lights = [Light("Sun", "sun", look_at((5, 1, 4), (0, 0, 0)), 8.0, (1, 0.9, 0.75), angle=math.radians(1))]
     scene.world = background((0.4, 0.6, 1.0), 0.6)
     return scene
 
 
 def office_with_blinds() -> Description:
-    """Desks in a room lit by the sky through forty slats."""
+    """Desks in a room lit by the sky through forty slats. One of four chairs rolls away from its desk and back."""
     scene = Description("office_with_blinds", Camera(look_at((2.4, -2.6, 1.7), (-1.5, 1.2, 0.8)), math.radians(62)),
-                        resolution=(320, 180))
+                        frames=FRAMES, resolution=(320, 180))
     scene.materials.update(
         wall=diffuse((0.75, 0.74, 0.7)), carpet=diffuse((0.25, 0.27, 0.3)), wood=diffuse((0.5, 0.33, 0.2)),
         slat=node("mix_shader", fac=0.3, shader=diffuse((0.8, 0.8, 0.76)),
@@ -82,8 +98,16 @@ def office_with_blinds() -> Description:
     desks = [translate((x, y, 0)) for x in (-1.6, 0.6) for y in (-0.8, 1.3)]
     scene.objects.append(Object("Desk", "Desk", np.array(desks), ("wood",)))
     scene.objects.append(Object("Screen", "Screen", np.array([d @ translate((0, 0.1, 0)) for d in desks]), ("screen",)))
-    scene.objects.append(Object("Chair", "Chair", np.array([d @ translate((0, -0.75, 0)) @ rotate(0.3) for d in desks]),
-                                ("seat",)))
+    chairs = [d @ translate((0, -0.75, 0)) @ rotate(0.3) for d in desks]
+    rolls = chairs.pop(2)  # of the desk next to the camera
+    scene.objects.append(Object("Chair", "Chair", np.array(chairs), ("seat",)))
+
+    def roll(frame: float) -> Matrix:
+        t = 2 * math.pi * _share(frame)
+        away = 0.5 - 0.5 * math.cos(t)
+        return translate((-0.75 * away, 0.1 * math.sin(t), 0)) @ rolls @ rotate(1.2 * away)
+
+    scene.objects.append(Object("Rolling chair", "Chair", materials=("seat",), move=roll))
     scene.lights = [Light("Sun", "sun", look_at((-5, 1.0, 3.5), (0, 0, 0)), 12.0, (1, 0.92, 0.8), angle=math.radians(0.6))]
     scene.world = background((0.6, 0.75, 1.0), 2.0)
     return scene
@@ -100,14 +124,15 @@ def _chair(segments: int = 24) -> Any:
 
 
 def conference_room(chairs: int = 40) -> Description:
-    """A long table, cushioned chairs, lamps in the ceiling: about 200,000 triangles, few of them instances."""
+    """A long table, cushioned chairs, lamps in the ceiling: about 200,000 triangles, few of them instances. A green bunny hops
+    across the table."""
     scene = Description("conference_room", Camera(look_at((3.6, -4.4, 2.1), (-0.8, 1.5, 0.7)), math.radians(65)),
-                        resolution=(320, 180))
+                        frames=FRAMES, resolution=(320, 180))
     scene.materials.update(
         wall=diffuse((0.72, 0.7, 0.66)), carpet=diffuse((0.3, 0.12, 0.12)), steel=node(
             "principled", base_color=(0.7, 0.7, 0.7), metallic=1.0, roughness=0.3),
         table=node("principled", base_color=(0.35, 0.18, 0.08), roughness=0.2), cushion=diffuse((0.1, 0.15, 0.3)),
-        lamp=emission(12.0),
+        lamp=emission(12.0), fur=diffuse((0.12, 0.5, 0.1)),
     )
     scene.add("Room", box((-4.5, -6, 0), (4.5, 6, 3.0), inward=True), "wall")
     scene.add("Carpet", transformed(grid(8.98, 11.98, 60, 80, lambda x, y: 0.004 * np.sin(40 * x) * np.sin(37 * y)),
@@ -128,6 +153,13 @@ def conference_room(chairs: int = 40) -> Description:
         x, y = -2.2 + 4.4 * (i % 2), -4.2 + 2.8 * (i // 2)
         lamp = quad((x - 0.5, y + 0.2, 2.99), (x + 0.5, y + 0.2, 2.99), (x + 0.5, y - 0.2, 2.99), (x - 0.5, y - 0.2, 2.99))
         scene.add(f"Lamp {i + 1}", lamp, "lamp")
+
+    def hop(frame: float) -> Matrix:
+        at = _share(frame)
+        lift = 0.12 * abs(math.sin(8 * math.pi * at))
+        return translate((0.5 - at, -2.0 + 3.6 * at, 0.76 + lift)) @ rotate(math.atan2(3.6, -1.0)) @ scale(0.5)
+
+    scene.add("Bunny", bunny(21), "fur", move=hop)
     return scene
 
 

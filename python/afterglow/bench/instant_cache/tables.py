@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tables in the form of Debattista et al. 2009, ours beside theirs, from what the bench measured:
-python -m afterglow.bench.instant_cache.tables [details.json ...], all of build/bench by default. Table 3 counts frames a second;
-table 5 has the share of pixels with FLIP above 0.1 in place of HDR-VDP's."""
+python -m afterglow.bench.instant_cache.tables [details.json ...], all of build/bench by default. RT is Whitted's ray tracing:
+direct and specular light alone. Table 3 counts frames a second, RT's from the figure `whole_frame`; table 5 has the share of
+pixels with FLIP above 0.1 in place of HDR-VDP's."""
 
 from __future__ import annotations
 
@@ -13,22 +14,9 @@ from typing import Any
 from ... import chart
 from ..figure import recorded
 from .animations import FIRST, MOVING
+from .paper import DIFFERENT, WHOLE_FIRST, WHOLE_MOVING
 
 Row = tuple[str, ...]
-# The paper's whole frames: table 1, seconds of the first one by IGI and IC; table 3, frames a second by IGI, IC and TIC. Table 5:
-# per cent of the pixels that HDR-VDP would have seen to differ from path tracing and from IGI, with a probability above 75 %.
-WHOLE_FIRST: dict[str, tuple[float, float]] = {
-    "cornell_statue": (0.59, 0.21), "wobbling_cylinder": (0.62, 0.19), "desk_with_chair": (0.76, 0.21), "bunnies": (0.72, 0.33),
-    "cornell_indirect": (0.77, 0.24), "conference_room": (1.58, 0.45), "pillared_hall": (1.27, 0.85),
-    "office_with_blinds": (0.78, 0.23)}
-WHOLE_MOVING: dict[str, tuple[float, float, float]] = {
-    "cornell_statue": (2.11, 6.01, 10.45), "wobbling_cylinder": (1.63, 2.79, 8.95), "desk_with_chair": (1.31, 4.92, 8.94),
-    "bunnies_1": (1.49, 3.42, 9.13), "bunnies_2": (1.45, 3.55, 8.04), "bunnies_4": (1.46, 3.51, 5.81),
-    "bunnies_9": (1.47, 3.54, 3.56)}
-DIFFERENT: dict[str, tuple[float, float]] = {
-    "cornell_statue": (0.57, 0.0), "wobbling_cylinder": (0.13, 0.0), "desk_with_chair": (2.11, 0.02), "bunnies": (0.21, 0.0),
-    "cornell_mirror": (0.91, 0.0), "cornell_indirect": (1.86, 0.33), "conference_room": (1.61, 0.16),
-    "pillared_hall": (0.18, 0.06), "office_with_blinds": (0.45, 0.23)}
 
 
 def seconds(stages: Mapping[str, float], whole: bool) -> float:
@@ -41,6 +29,11 @@ def middle(frames: Iterable[Mapping[str, float]], whole: bool) -> float:
     return median(seconds(stages, whole) for stages in frames)
 
 
+def fastest(whitted: Mapping[str, list[float]] | None) -> float | None:
+    """Seconds of a frame of direct and specular light alone, by whichever way was the faster one."""
+    return min(median(times) for times in whitted.values()) if whitted else None
+
+
 def numbers(*values: float | None) -> Row:
     return tuple("–" if value is None else f"{value:.2f}" for value in values)
 
@@ -51,28 +44,37 @@ def by_key(figures: list[dict[str, Any]], figure: str) -> dict[str, dict[str, An
 
 def first(figures: list[dict[str, Any]], whole: bool) -> list[Row]:
     """Tables 1 (whole) and 2 (diffuse part)."""
-    rows: list[Row] = [("scene", "IGI s", "IC s", "IC over IGI", "paper: IGI s", "IC s", "IC over IGI")]
+    names = (*(["RT s"] if whole else []), "IGI s", "IC s", "IC over IGI")
+    rows: list[Row] = [("scene", *names, "paper: " + names[0], *names[1:])]
     for name, figure in by_key(figures, "diffuse part of the first frame, IC over IGI").items():
-        stages = figure["details"]["stages"]
-        every, cached = (middle(stages[kind], whole) for kind in ("IGI", "IC"))
+        details = figure["details"]
+        every, cached = (middle(details["stages"][kind], whole) for kind in ("IGI", "IC"))
+        ours: tuple[float | None, ...] = (every, cached, every / cached)
         paper = WHOLE_FIRST.get(name) if whole else FIRST[name].first
-        theirs = (*paper, paper[0] / paper[1]) if paper else (None, None, None)
-        rows.append((name, *numbers(every, cached, every / cached, *theirs)))
+        theirs: tuple[float | None, ...] = (*paper, paper[-2] / paper[-1]) if paper else (None,) * (4 if whole else 3)
+        if whole:
+            ours = (fastest(details.get("whitted")), *ours)
+        rows.append((name, *numbers(*ours, *theirs)))
     return rows
 
 
 def moving(figures: list[dict[str, Any]], whole: bool) -> list[Row]:
     """Tables 3 (frames a second of the whole) and 4 (seconds of the diffuse part)."""
-    rows: list[Row] = [("animation", "IGI", "IC", "TIC", "TIC over IGI", "TIC over IC", "paper: IGI", "IC", "TIC", "TIC over IGI",
-                        "TIC over IC")]
+    names = (*(["RT"] if whole else []), "IGI", "IC", "TIC", "TIC over IGI", "TIC over IC")
+    rows: list[Row] = [("animation", *names, "paper: " + names[0], *names[1:])]
+    whitted = by_key(figures, "whole frame, TIC over Whitted")
     for name, figure in by_key(figures, "diffuse part, TIC over IGI").items():
         every, fresh, kept = (seconds(figure["details"]["stages"][kind], whole) for kind in ("IGI", "IC", "TIC"))
-        paper = WHOLE_MOVING.get(name) if whole else MOVING[name].moving
-        theirs: tuple[float | None, ...] = (None,) * 5
-        if paper:
-            over = (paper[2] / paper[0], paper[2] / paper[1]) if whole else (paper[0] / paper[2], paper[1] / paper[2])
-            theirs = (*paper, *over)
-        shown = (1 / every, 1 / fresh, 1 / kept) if whole else (every, fresh, kept)
+        theirs: tuple[float | None, ...]
+        if whole:
+            direct = fastest(whitted[name]["details"].get("whitted")) if name in whitted else None
+            speeds = WHOLE_MOVING.get(name)
+            theirs = (*speeds, speeds[3] / speeds[1], speeds[3] / speeds[2]) if speeds else (None,) * 6
+            shown: tuple[float | None, ...] = (1 / direct if direct else None, 1 / every, 1 / fresh, 1 / kept)
+        else:
+            paper = MOVING[name].moving
+            theirs = (*paper, paper[0] / paper[2], paper[1] / paper[2]) if paper else (None,) * 5
+            shown = (every, fresh, kept)
         rows.append((name, *numbers(*shown, every / kept, fresh / kept, *theirs)))
     return rows
 

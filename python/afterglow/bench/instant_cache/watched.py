@@ -54,8 +54,13 @@ class Frame:
         return self.repair + self.interpolate + self.filter
 
     @property
+    def specular(self) -> float:
+        """Camera paths with direct and specular light, and the film: all but the diffuse part."""
+        return self.walk + self.film
+
+    @property
     def whole(self) -> float:
-        return self.diffuse + self.walk + self.film
+        return self.diffuse + self.specular
 
 
 class Watched:
