@@ -311,6 +311,26 @@ def test_what_was_not_seen_for_thousands_of_passes() -> None:
     assert live.number("cache_resets") == 1
 
 
+def test_an_edit_long_after_a_look_and_a_look_long_after_the_edit() -> None:
+    """More than 4096 passes together: ages neither wrap before the edit nor after it."""
+    live = Live(two_rooms(), start=False, **SETTINGS)
+    for i in range(8):
+        live.run(seed=i)
+    live.look_from(*WALL)
+
+    def passes(count: int, seed: int) -> None:
+        live.run(viewport=True, width=8, height=8, samples=2 * count, seed=seed)
+        assert len(live.session.statistics()["passes_log"]) > 0.8 * count
+        live.session.update(dict(viewport=False, width=SIZE, height=SIZE, samples=1))
+        live.session.wait()
+
+    passes(2000, 100)
+    live.edit(lambda: halve_both(live.built))
+    passes(2400, 101)
+    assert halves(live.look_from(*FRONT)) == pytest.approx([1.0, 1.0], abs=0.15)
+    assert live.number("cache_resets") == 1
+
+
 def test_a_hundred_edits_out_of_sight() -> None:
     """What the edits said is kept of the last 64 alone; cells that missed more know nothing."""
     live = Live(two_rooms(), start=False, **SETTINGS)

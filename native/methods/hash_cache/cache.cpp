@@ -45,8 +45,15 @@ Rgb scale_color(float t) {
 void Cache::configure(const CacheSettings& settings) {
   if (!(settings.caching == settings_.caching)) stale_ = true;
   settings_ = settings;
-  if (settings.limit < table_.bytes()) stale_ = true;
-  table_.set_limit(settings.limit);
+  fit();
+}
+
+/// The table within its limit, whatever it holds already.
+void Cache::fit() {
+  if (stale_) table_.clear();
+  lost_before_ = lost(table_.counts());
+  table_.set_limit(settings_.limit, stamp_);
+  if (lost(table_.counts()) > lost_before_) log_message("warning", warning());
 }
 
 void Cache::clear(const CommittedScene& scene) {
@@ -54,6 +61,7 @@ void Cache::clear(const CommittedScene& scene) {
   healing_.clear();
   grid_ = Grid(scene.scene.bounds());
   counts_.resets++;
+  lost_before_ = 0;
   renders_ = stamp_ = 0;
   forgotten_.clear();
   pending_ = loaded_ = false;
@@ -74,7 +82,6 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
     edited(scene, changes, work);
   }
   stale_ = false;
-  lost_before_ = lost(table_.counts());
   seed_ = hash(hash(uint32_t(work.seed), uint32_t(work.seed >> 32)), renders_++, 0x48617368u);  // never a path twice
   next_pass();
   pass_ = work.pass;
@@ -101,6 +108,7 @@ bool Cache::validate(const CommittedScene& scene, const Work& work) {
 
 void Cache::next_pass() {
   healing_.begin_pass(++stamp_);
+  table_.keep_ages(stamp_);
   while (healing_.due()) table_.drop_older(healing_.retire(), stamp_);
 }
 

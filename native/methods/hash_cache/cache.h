@@ -43,7 +43,7 @@ class Cache {
   void load(const CommittedScene&, std::span<const char>);
   const CacheCounts& counts() const { return counts_; }
   const Table& table() const { return table_; }
-  /// What the user should know when cells did not fit since update(); else nothing.
+  /// What the user should know when cells did not fit since configure(); else nothing.
   std::string warning() const;
   const Healing& healing() const { return healing_; }
 
@@ -70,6 +70,7 @@ class Cache {
   Known find(const Cell& cell) const { return find(cell, key_of(cell)); }
   WalkScene walk_scene(const CommittedScene&) const;
   void clear(const CommittedScene&);
+  void fit();
   void edited(const CommittedScene&, const SceneChanges&, const Work&);
   bool validate(const CommittedScene&, const Work&);
   void next_pass();

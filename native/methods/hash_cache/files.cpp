@@ -165,6 +165,7 @@ void Cache::load(const CommittedScene& scene, std::span<const char> bytes) {
   shown_instances_.clear();
   counts_ = CacheCounts{};
   stale_ = false;
+  fit();
 }
 
 }  // namespace afterglow::hash_cache
