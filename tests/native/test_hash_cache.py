@@ -166,6 +166,30 @@ def test_all_from_the_cache_has_the_same_light(variant: str) -> None:
         assert results[0].statistics["rays"]["shadow"] == 0
 
 
+def test_all_from_a_cache_that_few_paths_fill() -> None:
+    """A tiled wall behind the camera, which only paths from the ground have met, then comes into view: what they found there is
+    without direct light, so further paths are sent."""
+    settings: dict[str, Any] = dict(samples=1, hash_direct=True, hash_resolution=0.1, hash_extra=0.0)
+
+    def wall(**more: Any) -> float:
+        scene = Description("ground and wall", Camera(look_at((0, -3, 2), (0, -1, 0)), math.radians(30)))
+        scene.materials["white"] = diffuse((0.8, 0.8, 0.8))
+        scene.add("Ground", quad((-3, -3, 0), (3, -3, 0), (3, 3, 0), (-3, 3, 0)), "white")
+        for i in range(64):
+            x, z = -1.6 + 0.4 * (i % 8), 0.2 + 0.4 * (i // 8)
+            scene.add(f"Tile{i}", quad((x, -3.1, z), (x, -3.1, z + 0.4), (x + 0.4, -3.1, z + 0.4), (x + 0.4, -3.1, z)), "white")
+        scene.lights = [Light("L", "point", translate((4, 30, 24)), 20000.0)]
+        live = Live(scene, **more)
+        live.run(seed=more.get("seed", 0) + 100, hash_resolution=1.0)
+        live.run(hash_resolution=0.1)
+        live.look_from((0, 0, 1.8), (0, -3, 1.8))
+        return float(live.session.read("combined")[..., :3].mean())
+
+    truth = wall(method="PATH_TRACING", samples=128)
+    found = [wall(seed=i, **settings) for i in range(12)]
+    agree(Mean(float(np.mean(found)), float(np.std(found, ddof=1) / 12**0.5)), Mean(truth, 0.003 * truth), tolerance=0.01)
+
+
 def test_the_first_picture_of_an_empty_cache_takes_its_samples() -> None:
     """And no other, whatever is edited; a viewport takes what it is asked for."""
     live = Live(cornell_box(), samples=1, hash_first=5, hash_extra=0.0, passes=["sample_count", "diffuse_indirect"])

@@ -38,6 +38,8 @@ class Cache {
   void update(const CommittedScene&, const SceneChanges&, Work&);
   /// One path from each chosen point, and from each that no cell could answer.
   void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
+  /// A debug view's colour in place of light: what the finest cell around the point holds.
+  Answer show(View, const CachePoint&) const;
   void answer(std::span<const CachePoint>, std::span<Answer>) const;
   std::vector<char> save(const CommittedScene&) const;
   void load(const CommittedScene&, std::span<const char>);
@@ -74,8 +76,13 @@ class Cache {
   void edited(const CommittedScene&, const SceneChanges&, const Work&);
   bool validate(const CommittedScene&, const Work&);
   void next_pass();
-  bool open(const CachePoint&) const;
-  Rgb shown(const Known&, const CachePoint&, int level) const;
+  struct Finest {
+    int level = 0;
+    Known known;
+  };
+  Finest finest(const CachePoint&) const;
+  /// Cells on the way lack what light sources send.
+  bool others_answer() const { return !settings_.caching.direct; }
   bool trace(const WalkScene&, std::span<const CachePoint>, std::span<const uint32_t> chosen, Work&);
 
   CacheSettings settings_;

@@ -59,9 +59,10 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_extra") extra_ = float(number_of(value));
       if (name == "hash_first") first_ = uint32_t(integer_of(value));
       if (name == "hash_long_paths") s.caching.long_paths = float(number_of(value));
-      if (name == "hash_view") s.view = view_of(value);
+      if (name == "hash_view") view_ = view_of(value);
     }
-    filter_ &= !denoised;  // what filters the whole picture does better with grain than with what this one leaves
+    filter_ &= view_ == View::kLight &&
+               !denoised;  // what filters the whole picture does better with grain than with what this one leaves
     cache_.configure(s);
   }
 
@@ -75,7 +76,8 @@ class HashCache final : public IndirectMethod {
     cache_.fill(scene, points, work);
   }
   void gather(const CommittedScene&, std::span<const CachePoint> points, std::span<Answer> answers) const override {
-    cache_.answer(points, answers);
+    if (view_ == View::kLight) return cache_.answer(points, answers);
+    for (size_t i = 0; i < points.size(); ++i) answers[i] = cache_.show(view_, points[i]);
   }
   std::vector<char> save(const CommittedScene& scene) const override { return cache_.save(scene); }
   void load(const CommittedScene& scene, std::span<const char> bytes) override { cache_.load(scene, bytes); }
@@ -115,8 +117,9 @@ class HashCache final : public IndirectMethod {
  private:
   Cache cache_;
   bool filter_ = true, running_ = true, direct_ = false, cold_ = true;
-  uint32_t lights_ = kLights, first_ = 0;
-  float extra_ = kExtra;
+  uint32_t lights_ = 1, first_ = 0;
+  float extra_ = 0.0f;
+  View view_ = View::kLight;
 };
 
 }  // namespace
