@@ -201,7 +201,9 @@ def test_the_first_picture_of_an_empty_cache_takes_its_samples() -> None:
     counts.append(int(live.session.read("sample_count").max()))
     live.run(seed=10, hash_first=0)
     counts.append(int(live.session.read("sample_count").max()))
-    assert counts == [5, 1, 5, 1]
+    live.run(seed=11, hash_first=5, hash_cell=2.0)  # cells of another size: emptied in the same update
+    counts.append(int(live.session.read("sample_count").max()))
+    assert counts == [5, 1, 5, 1, 5]
     assert Live(cornell_box(), samples=1, hash_first=5, viewport=True).session.statistics()["samples"] == 1
 
 

@@ -60,6 +60,7 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_first") first_ = uint32_t(integer_of(value));
       if (name == "hash_long_paths") s.caching.long_paths = float(number_of(value));
       if (name == "hash_view") view_ = view_of(value);
+    cache_.update(scene, changes, work);
     }
     filter_ &= view_ == View::kLight &&
                !denoised;  // what filters the whole picture does better with grain than with what this one leaves
@@ -69,7 +70,6 @@ class HashCache final : public IndirectMethod {
   void update(const CommittedScene& scene, const SceneChanges& changes, Work& work) override {
     cold_ = cache_.table().size() == 0;
     cache_.let_all_ask(cold_ && first_);
-    cache_.update(scene, changes, work);
   }
   bool refine(const CommittedScene&, Work&) override { return false; }
   void prepare(const CommittedScene& scene, std::span<const CachePoint> points, Work& work) override {
