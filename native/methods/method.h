@@ -110,6 +110,8 @@ class IndirectMethod {
 };
 
 const std::vector<MethodDescription>& method_descriptions();
+/// Every described setting: as given, else as its description says. configure() sees these alone.
+Settings with_defaults(const Settings& given);
 std::unique_ptr<IndirectMethod> make_method(const std::string& id);  // throws InvalidInput with the list of ids
 
 }  // namespace afterglow

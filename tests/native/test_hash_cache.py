@@ -312,20 +312,6 @@ def test_cells_that_are_kept_heal() -> None:
     assert abs(after / before - 0.5) < 0.05
 
 
-def test_memory_has_a_limit() -> None:
-    told: list[str] = []
-    afterglow.set_log(lambda level, text: told.append(text))
-    live = Live(cornell_box(), width=96, height=96, samples=1, hash_cell=0.25, hash_memory=1.0)
-    afterglow.set_log(None)
-    assert sum("hash_memory" in text for text in told) == 1
-    assert sum("hash_memory" in text for text in live.session.statistics()["warnings"]) == 1
-    assert live.number("cache_bytes") < 1.1 * 2**20
-    assert live.number("cells_refused") > 0
-    truth = render(cornell_box(), size=32, samples=64, passes=["diffuse_indirect"],
-                   diffuse_bounces=4).passes["diffuse_indirect"].mean()
-    assert abs(live.session.read("diffuse_indirect").mean() / truth - 1) < 0.2
-
-
 @pytest.mark.parametrize("sheets", [1, 2])
 def test_two_sheets_lit_from_one_side(sheets: int) -> None:
     """A tenth of a millimetre apart, or one alone: what shines on the upper one's top is in no other side's cells."""
@@ -368,60 +354,25 @@ def test_nothing_to_light_and_nothing_to_light_it() -> None:
     assert render(empty, size=8, samples=2, **HASH).image[..., :3].max() == 0.0
 
 
-@pytest.mark.parametrize("view", ["LEVEL", "COUNT", "AGE", "SIDE"])
-def test_debug_views_show_something(view: str) -> None:
-    shown = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], hash_view=view,
-                   **HASH).passes["diffuse_indirect"]
-    light = render(cornell_box(), size=16, samples=1, passes=["diffuse_indirect"], **HASH).passes["diffuse_indirect"]
-    assert shown.max() > 0 and not np.allclose(shown, light)
-
-
-def test_an_unknown_view_says_so() -> None:
-    with pytest.raises(afterglow.InvalidInput, match="hash_view"):
-        render(cornell_box(), size=8, samples=1, hash_view="NOISE", **HASH)
-
-
-def test_a_smaller_limit_starts_anew() -> None:
-    live = Live(cornell_box(), width=96, height=96, samples=1, hash_cell=0.25)
-    assert live.number("cache_bytes") > 1.1 * 2**20
-    live.run(hash_memory=1.0)
-    assert live.number("cache_bytes") < 1.1 * 2**20 and live.number("cache_resets") == 2
-
-
-def test_a_saved_cache_is_the_same_after_reload(tmp_path: Any) -> None:
-    first = Live(cornell_box())
-    path, again = str(tmp_path / "cells"), str(tmp_path / "again")
-    first.session.save_cache(path)
-    second = Live(cornell_box(), start=False)
-    second.session.load_cache(path)
-    second.session.save_cache(again)
-    assert open(path, "rb").read() == open(again, "rb").read()
-    assert np.array_equal(first.run(seed=7), second.run(seed=7))
-    assert second.number("cache_resets") == 0 and second.number("cells") == first.number("cells")
-
-
-def test_what_cannot_be_loaded_says_so(tmp_path: Any) -> None:
-    live = Live(cornell_box(), start=False)
-    path = tmp_path / "cells"
-    with pytest.raises(afterglow.InvalidInput, match="remembers nothing"):
-        live.session.save_cache(str(path))
-    with pytest.raises(afterglow.FileError):
-        live.session.load_cache(str(tmp_path / "nowhere" / "cells"))
-    live.run()
-    live.session.save_cache(str(path))
-    with pytest.raises(afterglow.FileError):
-        live.session.save_cache(str(tmp_path / "nowhere" / "cells"))
-    with pytest.raises(afterglow.InvalidInput, match="another scene"):
-        Live(furnace(0.5), start=False).session.load_cache(str(path))
-    whole = path.read_bytes()
-    for broken in (b"", whole[:100], whole[:-5], b"x" + whole[1:], whole[:-24] + bytes(24)):
-        path.write_bytes(broken)
-        with pytest.raises(afterglow.InvalidInput):
-            live.session.load_cache(str(path))
-    light = live.run(seed=3)
-    assert np.isfinite(light).all() and live.number("cache_resets") == 1  # nothing was lost
-
-
 def test_settings_are_described() -> None:
     described = {m["id"]: m for m in afterglow.method_descriptions()}["HASH_CACHE"]
     assert {"hash_cell", "hash_store", "hash_length", "hash_memory"} <= {s["name"] for s in described["settings"]}
+
+
+METHODS = [m["id"] for m in afterglow.method_descriptions()]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_not_given_is_as_described(method: str) -> None:
+    """Each setting of each method by itself, and all together, make the same picture as none."""
+    described = {m["id"]: m for m in afterglow.method_descriptions()}[method]["settings"]
+    defaults = {s["name"]: s["default"] for s in described}
+
+    def picture(**settings: Any) -> np.ndarray:
+        return afterglow.render(cornell_box("glossy"), width=16, height=16, samples=48, method=method, seed=1,
+                                **settings).image
+
+    expected = picture()
+    assert np.array_equal(picture(**defaults), expected)
+    for name, value in defaults.items():
+        assert np.array_equal(picture(**{name: value}), expected), name

@@ -10,7 +10,6 @@
 
 namespace afterglow::hash_cache {
 
-inline constexpr int kLevels = 32;
 inline constexpr int kRadiusLevel = 21;             // cells as large as the scene's radius
 inline constexpr int kTopLevel = kRadiusLevel - 2;  // the largest that are filled
 
