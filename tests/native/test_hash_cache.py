@@ -12,7 +12,7 @@ import pytest
 from afterglow.scenes import Camera, Description, Light, look_at, node, translate
 from afterglow.scenes.native import Built, graph
 from afterglow.scenes.rooms import cornell_box, diffuse, emission, furnace, sealed_box
-from afterglow.scenes.shapes import quad
+from afterglow.scenes.shapes import box, quad
 from hard_cases import Mean, agree, render
 
 HASH: dict[str, Any] = dict(method="HASH_CACHE")
@@ -326,6 +326,28 @@ def test_two_sheets_lit_from_one_side(sheets: int) -> None:
     truth = render(scene, size=32, samples=256, diffuse_bounces=4, passes=["diffuse_indirect"]).passes["diffuse_indirect"].mean()
     assert abs(lit.mean() / truth - 1) < 0.05
     assert live.look_from((0, -1.0, -1.5), (0, 0, 0)).max() == 0.0
+
+
+def red_and_blue() -> Description:
+    """Two closed rooms that share a wall thinner than a cell, each with a lamp: whatever bounces is red in one and blue in the
+    other. A tenth of a millimetre before each face hangs a sheet of its own, so that four faces stand within a cell."""
+    scene = Description("red and blue", Camera(look_at((-0.9, 0, 0), (0, 0, 0)), math.radians(60)))
+    scene.materials.update(red=diffuse((0.8, 0, 0)), blue=diffuse((0, 0, 0.8)), white=diffuse((0.8, 0.8, 0.8)))
+    scene.add("Wall", box((-0.0001, -1, -1), (0.0001, 1, 1)), "white")
+    for side, name in ((-1, "red"), (1, "blue")):
+        scene.add(f"Room {name}", box((min(side, 0), -1, -1), (max(side, 0), 1, 1), inward=True), name)
+        x = side * 0.0002
+        scene.add(f"Sheet {name}", quad((x, -0.5, -0.5), (x, 0.5, -0.5), (x, 0.5, 0.5), (x, -0.5, 0.5)), "white")
+        scene.lights.append(Light(name, "point", translate((side * 0.5, 0, 0.6)), 20.0, radius=0.05))
+    return scene
+
+
+def test_jittered_look_ups_stay_on_their_own_face() -> None:
+    for jitter in (0.0, 4.0):
+        live = Live(red_and_blue(), hash_jitter=jitter, hash_cell=8.0, samples=4)
+        for eye, other in ((-0.9, 2), (0.9, 0), (-0.9, 2)):
+            image = live.look_from((eye, 0, 0), (0, 0, 0))
+            assert image[..., other].max() == 0.0 and image[..., 2 - other].mean() > 0.01
 
 
 def test_sealed_box_stays_black() -> None:
