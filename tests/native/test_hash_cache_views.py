@@ -62,17 +62,17 @@ def test_the_sides_of_a_wall() -> None:
     assert colours[1][2] > 0.9 and colours[1][0] < 0.1
 
 
-def test_count_and_age_grow() -> None:
-    """Samples turn cells from blue towards red; a view that saw no new sample for many passes grows old."""
-    live = Live(wall(0.5), hash_view="COUNT", hash_extra=0.0, samples=1)
-    live.run(seed=1)
-    few = live.session.read("combined")[..., 0].mean()
-    for seed in range(2, 40):
-        live.run(seed=seed)
-    assert live.session.read("combined")[..., 0].mean() >= few
-    blue = live.session.read("combined")[..., 2].mean()
-    fresh = Live(wall(0.5), hash_view="COUNT", hash_extra=0.0, samples=1)
-    assert fresh.session.read("combined")[..., 2].mean() > blue
+@pytest.mark.parametrize(("view", "resolution"), [("COUNT", 1.0), ("AGE", 0.0)])
+def test_count_and_age_grow(view: str, resolution: float) -> None:
+    """From blue towards red: samples with every picture, or passes since the last of them."""
+    live = Live(wall(0.5), hash_view=view, hash_extra=0.0, samples=1)
+    colours = []
+    for seed in range(41):
+        live.run(seed=seed, **({"hash_resolution": resolution} if seed else {}))
+        if seed % 20 == 0:
+            colours.append(live.session.read("combined")[..., :3].mean((0, 1)))
+    blue = [c[2] for c in colours]
+    assert blue[0] > blue[1] + 0.1 and blue[1] >= blue[2] and colours[2][0] >= colours[0][0]
 
 
 def test_an_unknown_view_says_so() -> None:
