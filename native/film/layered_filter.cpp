@@ -41,21 +41,24 @@ inline Floats load(const float* from) {
 inline float most(float a, float b) { return a > b ? a : b; }
 inline Floats most(Floats a, Floats b) { return a > b ? a : b; }
 
-// The weights, of one pair of pixels or of eight.
+// The weights, all from 0 to 1 and without units, of one pair of pixels or of eight. (2)
 template <class T>
 T normal_weight(T cosine) {
   const T c = most(cosine, T{}), c2 = c * c, c4 = c2 * c2;
   return c4 * c4;
 }
+/// (3), by the distance from the plane.
 template <class T>
 T plane_weight(T off, T footprint_a, T footprint_b, float reach) {
   return most(1.0f - most(off, -off) / (0.5f * reach * most(footprint_a, footprint_b) + kTiny), T{});
 }
+/// (4), relative.
 template <class T>
 T segment_weight(T a, T b) {
   return most(1.0f - kSegment * most(a - b, b - a) / (most(a, b) + kTiny), T{});
 }
-/// 1 - log(1 + y) with y = kLuminance r / (1 + r) by the second Padé approximant, half a hundredth off at most.
+/// (6), relative to what is believed: 1 - log(1 + y) with y = kLuminance r / (1 + r) by the second Padé approximant,
+/// half a hundredth off at most.
 template <class T>
 T luminance_weight(T a, T b, T error) {
   const T difference = most(a - b, b - a);
@@ -64,20 +67,6 @@ T luminance_weight(T a, T b, T error) {
 }
 
 }  // namespace
-
-float normal_stop(const Vec3& a, const Vec3& b) { return normal_weight(glm::dot(a, b)); }
-
-float plane_stop(const LayerPixel& a, const LayerPixel& b, float reach) {
-  const Vec3 way = b.position - a.position;
-  const float off = std::max(std::fabs(glm::dot(way, a.normal)), std::fabs(glm::dot(way, b.normal)));
-  return plane_weight(off, a.footprint, b.footprint, reach);
-}
-
-float segment_stop(float a, float b) { return segment_weight(std::min(a, kMostLength), std::min(b, kMostLength)); }
-
-float luminance_stop(const Rgb& a, const Rgb& b, float error) {
-  return luminance_weight(luminance(a), luminance(b), error);
-}
 
 void LayeredFilter::begin(uint32_t width, uint32_t height) {
   width_ = width, height_ = height;

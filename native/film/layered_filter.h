@@ -21,12 +21,6 @@ struct LayerPixel {
   bool hole = false;  // nothing answered for it
 };
 
-/// Edge-stopping functions, all from 0 to 1 and without units.
-float normal_stop(const Vec3& a, const Vec3& b);                          // (2)
-float plane_stop(const LayerPixel& a, const LayerPixel& b, float reach);  // (3), by the distance from the plane
-float segment_stop(float a, float b);                                     // (4), relative
-float luminance_stop(const Rgb& a, const Rgb& b, float error);            // (6), relative to what is believed
-
 /// Passes of a 5 × 5 kernel whose taps spread by 1, 2, 4, … pixels (Dammertz et al. 2010). Holes take the mean of
 /// what surrounds them on their surface. Pixels that are exact stay as they are. The same on any number of threads.
 /// One layer after another: begin(), set() for each pixel that has a surface there, run(), light() of each.

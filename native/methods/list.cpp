@@ -33,6 +33,14 @@ const std::vector<MethodDescription>& method_descriptions() {
   return descriptions;
 }
 
+Settings with_defaults(const Settings& given) {
+  Settings all;
+  for (const MethodDescription& method : method_descriptions())
+    for (const SettingDescription& s : method.settings) all.emplace_back(s.name, s.default_value);
+  all.insert(all.end(), given.begin(), given.end());  // the last of a name counts
+  return all;
+}
+
 std::unique_ptr<IndirectMethod> make_method(const std::string& id) {
   std::string known;
   for (size_t i = 0; i < method_descriptions().size(); ++i) {

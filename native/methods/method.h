@@ -68,7 +68,8 @@ struct Answer {
   Rgb light{0.0f};
   float weight = 0.0f;
   float relative_error = 0.0f;
-};  // weight 0: a hole; 2: a colour of a debug view, shown as it is. gather() may keep what stands there already
+};                                      // weight 0: a hole. gather() may keep what stands there already
+inline constexpr float kAsItIs = 2.0f;  // weight of a debug view's colour: no light, shown as it is
 
 struct Work {
   StopToken stop;
@@ -109,6 +110,8 @@ class IndirectMethod {
 };
 
 const std::vector<MethodDescription>& method_descriptions();
+/// Every described setting: as given, else as its description says. configure() sees these alone.
+Settings with_defaults(const Settings& given);
 std::unique_ptr<IndirectMethod> make_method(const std::string& id);  // throws InvalidInput with the list of ids
 
 }  // namespace afterglow

@@ -29,7 +29,8 @@ void Renderer::leave(const CommittedScene& scene, std::unique_ptr<Renderer> rend
   scene.kept.leave(name, std::move(renderer));
 }
 
-void Renderer::configure(const Settings& settings) {
+void Renderer::configure(const Settings& given) {
+  const Settings settings = with_defaults(given);
   settings_ = WalkSettings{};
   settings_.configure(settings);
   method_->configure(settings);

@@ -225,7 +225,7 @@ void join(const FilmLayout& layout, const WalkSettings& settings, const Question
   add(Pass::kTransmissionIndirect, light * q.transmission);
 }
 
-bool shown_as_it_is(const Answer& answer) { return answer.weight > 1.5f; }
+bool shown_as_it_is(const Answer& answer) { return answer.weight == kAsItIs; }
 
 /// A debug view's colours take the place of the request's picture.
 bool show_colours(const FilmLayout& layout, const Wavefront& wave, size_t request, WalkedRequest& r) {

@@ -311,6 +311,26 @@ def test_what_was_not_seen_for_thousands_of_passes() -> None:
     assert live.number("cache_resets") == 1
 
 
+def test_an_edit_long_after_a_look_and_a_look_long_after_the_edit() -> None:
+    """More than 4096 passes together: ages neither wrap before the edit nor after it."""
+    live = Live(two_rooms(), start=False, **SETTINGS)
+    for i in range(8):
+        live.run(seed=i)
+    live.look_from(*WALL)
+
+    def passes(count: int, seed: int) -> None:
+        live.run(viewport=True, width=8, height=8, samples=2 * count, seed=seed)
+        assert len(live.session.statistics()["passes_log"]) > 0.8 * count
+        live.session.update(dict(viewport=False, width=SIZE, height=SIZE, samples=1))
+        live.session.wait()
+
+    passes(2000, 100)
+    live.edit(lambda: halve_both(live.built))
+    passes(2400, 101)
+    assert halves(live.look_from(*FRONT)) == pytest.approx([1.0, 1.0], abs=0.15)
+    assert live.number("cache_resets") == 1
+
+
 def test_a_hundred_edits_out_of_sight() -> None:
     """What the edits said is kept of the last 64 alone; cells that missed more know nothing."""
     live = Live(two_rooms(), start=False, **SETTINGS)
@@ -358,3 +378,21 @@ def test_cells_out_of_sight_are_not_saved_as_they_were_before_an_edit(tmp_path: 
     image = other.run(seed=77)
     assert other.number("cache_unannounced") == 0  # the paths were walked again before they were saved
     assert halves(image) == pytest.approx([1.0, 1.0], abs=0.15)
+
+
+def test_local_view_has_a_cache_of_its_own() -> None:
+    """Entering and leaving begin anew: what is hidden neither reflects nor shades, and nothing of either is kept; a view that
+    stays, or another camera within, keeps its cells."""
+    live = Live(two_rooms(), **SETTINGS)
+    whole = live.run(seed=1).mean()
+    left = [int(h) for name in ("Left", *(f"Ball{i}" for i in range(16))) for h in live.built.instances[name]]
+    alone = live.run(seed=2, local_view=left)
+    assert live.number("cache_resets") == 2 and alone[:, SIZE * 5 // 8:].max() == 0.0
+    fresh = Live(two_rooms(), start=False, **SETTINGS)
+    assert np.array_equal(alone, fresh.run(seed=2, local_view=left))
+    live.run(seed=3)
+    live.look_from(*WALL)
+    assert live.number("cache_resets") == 2
+    live.look_from(*FRONT)
+    again = live.run(seed=4, local_view=None)
+    assert live.number("cache_resets") == 3 and abs(again.mean() / whole - 1) < 0.2

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 from afterglow.scenes.rooms import cornell_box, furnace
 from hard_cases import render
 
@@ -40,3 +41,12 @@ def test_light_that_is_even_stays_as_it_is() -> None:
 def test_any_number_of_threads() -> None:
     one, two = (render(cornell_box("mirror"), size=40, samples=2, threads=n, seed=5, **SETTINGS).image for n in (1, 2))
     assert np.array_equal(one, two)
+
+
+@pytest.mark.parametrize("factor", [1024.0, 1 / 1024])
+def test_a_scaled_scene_is_filtered_alike(factor: float) -> None:
+    """Cells and all numbers scale with powers of two: nothing differs but what a length without a measure would change."""
+    scene = cornell_box("mirror")
+    a, b, bare = (render(s, size=40, samples=1, seed=3, hash_filter=f, **SETTINGS).passes["diffuse_indirect"]
+                  for s, f in ((scene, True), (scene.scaled(factor), True), (scene, False)))
+    assert np.array_equal(a, b) and np.abs(a - bare).mean() > 0.02 * a.mean()

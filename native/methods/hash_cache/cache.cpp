@@ -45,8 +45,15 @@ Rgb scale_color(float t) {
 void Cache::configure(const CacheSettings& settings) {
   if (!(settings.caching == settings_.caching)) stale_ = true;
   settings_ = settings;
-  if (settings.limit < table_.bytes()) stale_ = true;
-  table_.set_limit(settings.limit);
+  fit();
+}
+
+/// The table within its limit, whatever it holds already.
+void Cache::fit() {
+  if (stale_) table_.clear();
+  lost_before_ = lost(table_.counts());
+  table_.set_limit(settings_.limit, stamp_);
+  if (lost(table_.counts()) > lost_before_) log_message("warning", warning());
 }
 
 void Cache::clear(const CommittedScene& scene) {
@@ -54,6 +61,7 @@ void Cache::clear(const CommittedScene& scene) {
   healing_.clear();
   grid_ = Grid(scene.scene.bounds());
   counts_.resets++;
+  lost_before_ = 0;
   renders_ = stamp_ = 0;
   forgotten_.clear();
   pending_ = loaded_ = false;
@@ -74,7 +82,6 @@ void Cache::update(const CommittedScene& scene, const SceneChanges& changes, Wor
     edited(scene, changes, work);
   }
   stale_ = false;
-  lost_before_ = lost(table_.counts());
   seed_ = hash(hash(uint32_t(work.seed), uint32_t(work.seed >> 32)), renders_++, 0x48617368u);  // never a path twice
   next_pass();
   pass_ = work.pass;
@@ -101,6 +108,7 @@ bool Cache::validate(const CommittedScene& scene, const Work& work) {
 
 void Cache::next_pass() {
   healing_.begin_pass(++stamp_);
+  table_.keep_ages(stamp_);
   while (healing_.due()) table_.drop_older(healing_.retire(), stamp_);
 }
 
@@ -230,7 +238,7 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   const std::vector<uint32_t>& rest = of[kEmpty];
   std::vector<uint8_t> hole(rest.size());
   parallel_blocks(rest.size(), 256, work.threads, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) hole[i] = open(points[rest[i]]);
+    for (size_t i = begin; i < end; ++i) hole[i] = !finest(points[rest[i]]).known;
   });
   std::vector<uint32_t> holes;
   for (size_t i = 0; i < rest.size(); ++i)
@@ -245,13 +253,16 @@ Known Cache::look_up(const CachePoint& p, const Vec3& offset, uint32_t owner, in
   return known ? known : find(grid_.cell(p.position, owner, level));
 }
 
-/// Whether no cell at all could answer.
-bool Cache::open(const CachePoint& p) const {
-  const uint32_t owner = owner_of(p.instance, p.face_normal);
-  for (int level = int(grid_.level(p.footprint * settings_.caching.cell_pixels)); level <= kTopLevel; ++level)
-    if (find(grid_.cell(p.position, owner, level)) || find(grid_.cell(p.position, owner | kOnTheWay, level)))
-      return false;
-  return true;
+/// The finest cell at the point that could answer, if any.
+Cache::Finest Cache::finest(const CachePoint& p) const {
+  const uint32_t own = owner_of(p.instance, p.face_normal);
+  const int first = int(grid_.level(p.footprint * settings_.caching.cell_pixels));
+  for (const uint32_t owner : {own, own | kOnTheWay}) {
+    if (owner != own && !others_answer()) break;
+    for (int level = first; level <= kTopLevel; ++level)
+      if (const Known known = find(grid_.cell(p.position, owner, level))) return {level, known};
+  }
+  return {};
 }
 
 /// The level between two is told by lot, in proportion: that asks half as many cells as their blend.
@@ -302,7 +313,7 @@ Answer Cache::resolve(const CachePoint& p, const LookUp& look) const {
   Known known = look.settled ? look.first : find(look.cell, look.key);
   if (!known) known = look.first;
   if (float(known.count) >= settings_.trusted)
-    return {kPi * shown(known, p, look.level), 1.0f, 1.0f / std::sqrt(1.0f + float(known.count))};
+    return {kPi * known.light, 1.0f, 1.0f / std::sqrt(1.0f + float(known.count))};
   return blend(p, look);
 }
 
@@ -310,40 +321,35 @@ Answer Cache::resolve(const CachePoint& p, const LookUp& look) const {
 Answer Cache::blend(const CachePoint& p, const LookUp& look) const {
   Rgb light(0.0f);
   float missing = 1.0f, samples = 0.0f;
-  const auto take = [&](const Known& known, int level) {
+  const auto take = [&](const Known& known) {
     const float taken = missing * trust(known.count, settings_.trusted);
-    light += taken * shown(known, p, level);
+    light += taken * known.light;
     samples += taken * float(known.count);
     missing -= taken;
   };
   for (int level = look.level; level <= kTopLevel && missing > kEnough; ++level) {
     // A cell longer than the way that the ray came holds light of places that the ray has left long ago.
     if (level > look.level && missing < 1.0f && grid_.size(level) > p.segment) break;
-    if (const Known known = look_up(p, look.offset, look.owner, level)) take(known, level);
+    if (const Known known = look_up(p, look.offset, look.owner, level)) take(known);
   }
   // Where the camera's paths have left nothing at all: what others found there, without the last of their bounces.
-  for (int level = look.level; level <= kTopLevel && !(missing < 1.0f); ++level)
-    if (const Known known = look_up(p, look.offset, look.owner | kOnTheWay, level)) take(known, level);
+  for (int level = look.level; others_answer() && level <= kTopLevel && !(missing < 1.0f); ++level)
+    if (const Known known = look_up(p, look.offset, look.owner | kOnTheWay, level)) take(known);
   if (!(missing < 1.0f)) return {};
   const float found = 1.0f - missing;
   return {kPi / found * light, 1.0f, 1.0f / std::sqrt(1.0f + samples / found)};
 }
 
-/// Light, or what a debug view shows in its place.
-Rgb Cache::shown(const Known& known, const CachePoint& p, int level) const {
-  switch (settings_.view) {
-    case View::kLight:
-      return known.light;
-    case View::kLevel:
-      return scale_color(float(level % 8) / 7.0f);
-    case View::kCount:
-      return scale_color(std::log2(float(known.count)) / 20.0f);
-    case View::kAge:
-      return scale_color(float((stamp_ - known.stamp) % Record::kStamps) / 64.0f);
-    case View::kSide:
-      return 0.5f + 0.5f * p.face_normal;
-  }
-  return known.light;
+Answer Cache::show(View view, const CachePoint& p) const {
+  const Finest found = finest(p);
+  if (!found.known) return {};
+  const uint32_t side = side_of(p.face_normal);  // of the cell: its owner's
+  Rgb colour(0.0f);
+  if (view == View::kLevel) colour = scale_color(float(found.level % 8) / 7.0f);
+  if (view == View::kCount) colour = scale_color(std::log2(float(found.known.count)) / 20.0f);
+  if (view == View::kAge) colour = scale_color(float(found.known.age) / 64.0f);
+  if (view == View::kSide) colour = Rgb(float(side & 1u), 0.3f * float(side >> 1), float(~side & 1u));
+  return {colour, kAsItIs, 0.0f};
 }
 
 }  // namespace afterglow::hash_cache

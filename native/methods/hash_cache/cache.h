@@ -13,14 +13,13 @@ enum class View { kLight, kLevel, kCount, kAge, kSide };
 
 struct CacheSettings {
   CachingSettings caching;
-  float resolution = 1.0f;  // share of the questions that send a path (the caching resolution factor, squared)
-  float jitter = 0.5f;      // of look-ups, in cell widths (s_j)
-  float trusted = 32.0f;    // samples from which on a cell answers alone
-  float enough = 128.0f;    // samples from which on a cell gets paths more rarely
-  uint32_t validate = 96;   // kept paths that are walked again in every update without edits
-  uint32_t keep = 0;        // samples that old light counts for at most when the scene changes; 0: starts anew
-  size_t limit = size_t(1) << 30;
-  View view = View::kLight;
+  float resolution = 1.0f;         // share of the questions that send a path (the caching resolution factor, squared)
+  float jitter = 0.0f;             // of look-ups, in cell widths (s_j)
+  float trusted = 1.0f;            // samples from which on a cell answers alone
+  float enough = 1.0f;             // samples from which on a cell gets paths more rarely
+  uint32_t validate = 0;           // kept paths that are walked again in every update without edits
+  uint32_t keep = 0;               // samples that old light counts for at most when the scene changes; 0: starts anew
+  size_t limit = size_t(1) << 40;  // bytes of the table
 };
 
 struct CacheCounts {
@@ -39,11 +38,13 @@ class Cache {
   /// One path from each chosen point, and from each that no cell could answer.
   void fill(const CommittedScene&, std::span<const CachePoint>, Work&);
   void answer(std::span<const CachePoint>, std::span<Answer>) const;
+  /// A debug view's colour in place of light: what the finest cell around the point holds.
+  Answer show(View, const CachePoint&) const;
   std::vector<char> save(const CommittedScene&) const;
   void load(const CommittedScene&, std::span<const char>);
   const CacheCounts& counts() const { return counts_; }
   const Table& table() const { return table_; }
-  /// What the user should know when cells did not fit since update(); else nothing.
+  /// What the user should know when cells did not fit since configure(); else nothing.
   std::string warning() const;
   const Healing& healing() const { return healing_; }
 
@@ -69,12 +70,18 @@ class Cache {
   }
   Known find(const Cell& cell) const { return find(cell, key_of(cell)); }
   WalkScene walk_scene(const CommittedScene&) const;
+  void fit();
   void clear(const CommittedScene&);
   void edited(const CommittedScene&, const SceneChanges&, const Work&);
   bool validate(const CommittedScene&, const Work&);
   void next_pass();
-  bool open(const CachePoint&) const;
-  Rgb shown(const Known&, const CachePoint&, int level) const;
+  struct Finest {
+    int level = 0;
+    Known known;
+  };
+  Finest finest(const CachePoint&) const;
+  /// Cells on the way lack what light sources send.
+  bool others_answer() const { return !settings_.caching.direct; }
   bool trace(const WalkScene&, std::span<const CachePoint>, std::span<const uint32_t> chosen, Work&);
 
   CacheSettings settings_;

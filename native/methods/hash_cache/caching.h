@@ -16,11 +16,11 @@ namespace afterglow::hash_cache {
 
 struct CachingSettings {
   WalkSettings walk;
-  uint32_t store = 3;         // diffuse vertices of a path that keep a sample, the asking point included (l_store)
-  uint32_t length = 0;        // further vertices whose light each of them gets (l_len); 0: as the bounce limits say
-  float cell_pixels = 4.0f;   // width of the finest cells in pixels
-  bool direct = false;        // cells hold the light of the light sources, too
-  float long_paths = 0.125f;  // share of the paths that never end in a cell
+  uint32_t store = 1;        // diffuse vertices of a path that keep a sample, the asking point included (l_store)
+  uint32_t length = 0;       // further vertices whose light each of them gets (l_len); 0: as the bounce limits say
+  float cell_pixels = 1.0f;  // width of the finest cells in pixels
+  bool direct = false;       // cells hold the light of the light sources, too
+  float long_paths = 1.0f;   // share of the paths that never end in a cell
   bool operator==(const CachingSettings& o) const;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Which cell of which level a surface point belongs to: a cubic grid whose cells double in size from level to level
 // (Roth et al. 2020, 3.1), and within each cell one entry for every object and side, so that the two sides of a sheet
-// and two sheets in the same cell are never mixed and no side depends on who came first. Pure functions.
+// and two objects in the same cell are never mixed and no side depends on who came first. Pure functions.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,6 @@
 
 namespace afterglow::hash_cache {
 
-inline constexpr int kLevels = 32;
 inline constexpr int kRadiusLevel = 21;             // cells as large as the scene's radius
 inline constexpr int kTopLevel = kRadiusLevel - 2;  // the largest that are filled
 

@@ -12,7 +12,7 @@ namespace afterglow::hash_cache {
 namespace {
 
 constexpr char kMagic[16] = "afterglow cells";
-constexpr uint32_t kFormat = 4;
+constexpr uint32_t kFormat = 5;
 
 /// A path that is kept for walking again, and its place among them.
 struct SavedProbe {
@@ -63,7 +63,7 @@ struct Header {
   uint64_t instances, triangles, lights;
   float finest, corner[3];
   uint32_t store, length;
-  float cell_pixels, clamp_indirect;
+  float cell_pixels, long_paths, clamp_indirect;
   uint32_t max_bounces, diffuse, glossy, transmission, transparent, caustics, direct;
   uint32_t renders, stamp;
 };
@@ -105,7 +105,7 @@ std::vector<char> Cache::save(const CommittedScene& scene) const {
   h.store = s.store, h.length = s.length, h.cell_pixels = s.cell_pixels, h.clamp_indirect = s.walk.clamp_indirect;
   h.max_bounces = l.max_bounces, h.diffuse = l.diffuse, h.glossy = l.glossy, h.transmission = l.transmission;
   h.transparent = l.transparent, h.caustics = uint32_t(l.caustics_reflective) | uint32_t(l.caustics_refractive) << 1;
-  h.direct = s.direct;
+  h.direct = s.direct, h.long_paths = s.long_paths;
   h.renders = renders_, h.stamp = stamp_;
   std::vector<char> bytes;
   const auto append = [&](const void* from, size_t count) {
@@ -160,11 +160,12 @@ void Cache::load(const CommittedScene& scene, std::span<const char> bytes) {
   s.store = h.store, s.length = h.length, s.cell_pixels = h.cell_pixels, s.walk.clamp_indirect = h.clamp_indirect;
   l.max_bounces = h.max_bounces, l.diffuse = h.diffuse, l.glossy = h.glossy, l.transmission = h.transmission;
   l.transparent = h.transparent, l.caustics_reflective = h.caustics & 1u, l.caustics_refractive = h.caustics & 2u;
-  s.direct = h.direct;
+  s.direct = h.direct, s.long_paths = h.long_paths;
   renders_ = h.renders, stamp_ = h.stamp;
   shown_instances_.clear();
   counts_ = CacheCounts{};
   stale_ = false;
+  fit();
 }
 
 }  // namespace afterglow::hash_cache

@@ -9,9 +9,6 @@ namespace afterglow::hash_cache {
 
 namespace {
 
-constexpr uint32_t kLights = 2;
-constexpr float kExtra = 2.0f;
-constexpr uint32_t kKeep = 1000000;
 constexpr const char* kViews[] = {"LIGHT", "LEVEL", "COUNT", "AGE", "SIDE"};
 
 View view_of(const SettingValue& value) {
@@ -25,19 +22,15 @@ View view_of(const SettingValue& value) {
 class HashCache final : public IndirectMethod {
  public:
   MethodTraits traits() const override {
-    return {.layers = filter_, .running = running_, .lights = direct_ ? 0u : lights_, .extra = extra_,
+    return {.layers = filter_,
+            .running = running_,
+            .lights = direct_ ? 0u : lights_,
+            .extra = extra_,
             .first = cold_ ? first_ : 0u};
   }
 
   void configure(const Settings& settings) override {
     CacheSettings s;
-    filter_ = true;
-    running_ = true;
-    lights_ = kLights;
-    extra_ = kExtra;
-    first_ = 0;
-    s.keep = kKeep;
-    direct_ = false;
     s.caching.walk.configure(settings);
     bool denoised = false;
     for (const auto& [name, value] : settings) {
@@ -59,23 +52,25 @@ class HashCache final : public IndirectMethod {
       if (name == "hash_extra") extra_ = float(number_of(value));
       if (name == "hash_first") first_ = uint32_t(integer_of(value));
       if (name == "hash_long_paths") s.caching.long_paths = float(number_of(value));
-      if (name == "hash_view") s.view = view_of(value);
+      if (name == "hash_view") view_ = view_of(value);
     }
-    filter_ &= !denoised;  // what filters the whole picture does better with grain than with what this one leaves
+    filter_ &= view_ == View::kLight &&
+               !denoised;  // what filters the whole picture does better with grain than with what this one leaves
     cache_.configure(s);
   }
 
   void update(const CommittedScene& scene, const SceneChanges& changes, Work& work) override {
+    cache_.update(scene, changes, work);
     cold_ = cache_.table().size() == 0;
     cache_.let_all_ask(cold_ && first_);
-    cache_.update(scene, changes, work);
   }
   bool refine(const CommittedScene&, Work&) override { return false; }
   void prepare(const CommittedScene& scene, std::span<const CachePoint> points, Work& work) override {
     cache_.fill(scene, points, work);
   }
   void gather(const CommittedScene&, std::span<const CachePoint> points, std::span<Answer> answers) const override {
-    cache_.answer(points, answers);
+    if (view_ == View::kLight) return cache_.answer(points, answers);
+    for (size_t i = 0; i < points.size(); ++i) answers[i] = cache_.show(view_, points[i]);
   }
   std::vector<char> save(const CommittedScene& scene) const override { return cache_.save(scene); }
   void load(const CommittedScene& scene, std::span<const char> bytes) override { cache_.load(scene, bytes); }
@@ -115,8 +110,9 @@ class HashCache final : public IndirectMethod {
  private:
   Cache cache_;
   bool filter_ = true, running_ = true, direct_ = false, cold_ = true;
-  uint32_t lights_ = kLights, first_ = 0;
-  float extra_ = kExtra;
+  uint32_t lights_ = 1, first_ = 0;
+  float extra_ = 0.0f;
+  View view_ = View::kLight;
 };
 
 }  // namespace
@@ -140,19 +136,19 @@ MethodDescription describe() {
       "Share of the paths that go their whole way; the others end at their second surface where a cell knows the rest",
       "", 0.125, 0.01, 1.0);
   add("hash_lights", "Light Samples", "Times that light sources are asked at the surface that a pixel shows", "",
-      int64_t(kLights), 1.0, 64.0);
+      int64_t(2), 1.0, 64.0);
   add("hash_direct", "All from the Cache",
       "The light of light sources on diffuse surfaces comes from the cells, too: fewer rays, blurred shadows", "",
       false, 0.0, 1.0);
   add("hash_extra", "Extra Camera Samples",
       "Samples beyond every pixel's own, for each of those one on average, that go where the picture is noisy: edges, "
       "gloss",
-      "", double(kExtra), 0.0, 16.0);
+      "", 2.0, 0.0, 16.0);
   add("hash_first", "First Samples",
-      "Samples that the first picture of an empty cache takes at least, at full caching resolution: what it leaves, all "
+      "Samples that the first picture of an empty cache takes at least, at full caching resolution: what it leaves, "
+      "all "
       "that follow begin with",
-      "",
-      int64_t(0), 0.0, 65536.0);
+      "", int64_t(0), 0.0, 65536.0);
   add("hash_resolution", "Caching Resolution",
       "Paths that fill the cache, as a share of the image's width and height; what no cell answers is filled anyway",
       "", 1.0, 0.0, 1.0);
@@ -172,7 +168,7 @@ MethodDescription describe() {
       "Samples that a cell's light of before an edit counts for at most; paths that are walked again say for how many "
       "it "
       "may, and by how much light changed. 0: an edit starts anew",
-      "", int64_t(kKeep), 0.0, 1e6);
+      "", int64_t(1000000), 0.0, 1e6);
   add("hash_validate", "Validated Paths",
       "Kept paths that are walked again in every frame without an edit; where one brings other light, cells heal as "
       "after "

@@ -204,12 +204,12 @@ Change Healing::change_at(const Edit& edit, const Cell& cell) {
 }
 
 Known Healing::mended(const Record& r, const Cell& cell) const {
-  const uint32_t age = (stamp_ - r.stamp()) & (Record::kStamps - 1), owner = cell.owner & ~kOnTheWay;
+  const uint32_t owner = cell.owner & ~kOnTheWay;
   Cell place = cell;
   place.owner = owner;
-  Known k{r.light(), r.count(), r.stamp()};
+  Known k{r.light(), r.count(), r.age(stamp_)};
   for (auto edit = edits_.rbegin(); edit != edits_.rend() && k.count; ++edit) {
-    if (age <= stamp_ - edit->stamp) break;
+    if (k.age <= stamp_ - edit->stamp) break;
     if (std::binary_search(edit->forgotten.begin(), edit->forgotten.end(), owner / 8u)) return {};
     const Change change = change_at(*edit, place);
     k.light = glm::min(k.light * change.ratio, Rgb(1e30f));

@@ -40,7 +40,7 @@ uint32_t samples_worth(uint32_t samples, float doubt);
 struct Known {
   Rgb light{0.0f};
   uint32_t count = 0;
-  uint32_t stamp = 0;
+  uint32_t age = 0;  // passes since its last sample
   explicit operator bool() const { return count != 0; }
 };
 
@@ -49,7 +49,8 @@ class Healing {
   static constexpr size_t kProbes = 4096;
   static constexpr int kRegionLevels = 1;  // regions are twice as wide as cells
   static constexpr size_t kEdits = 64;
-  static constexpr uint32_t kOldest = 3072;  // passes; ages of records are known modulo 4096
+  static constexpr uint32_t kOldest = 1792;  // passes that an edit is known for
+  static_assert(kOldest < Record::kOld);     // else cells of before it could pass for younger ones
 
   void clear();
   /// The newest paths take the places of older ones of the same region.
@@ -70,11 +71,9 @@ class Healing {
   bool due() const;
   /// Forgets the oldest edit; answers with the age, in passes, above which cells have not seen it.
   uint32_t retire();
-  bool stale(const Record& r) const {
-    return active() && ((stamp_ - r.stamp()) & (Record::kStamps - 1)) > stamp_ - edits_.back().stamp;
-  }
+  bool stale(const Record& r) const { return active() && r.age(stamp_) > stamp_ - edits_.back().stamp; }
   Known known(const Record& r, const Cell& cell) const {
-    return stale(r) ? mended(r, cell) : Known{r.light(), r.count(), r.stamp()};
+    return stale(r) ? mended(r, cell) : Known{r.light(), r.count(), r.age(stamp_)};
   }
   /// Before new samples join a cell.
   void mend(Record& r, const Cell& cell) const {

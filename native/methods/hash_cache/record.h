@@ -19,12 +19,18 @@ inline constexpr int kDarkest = -107, kBrightest = 127;
 
 struct Record {
   static constexpr uint32_t kMostSamples = (1u << 19) - 1, kStamps = 1u << 12;
-  uint32_t tag = 0;   // half of the cell's key; 0: empty
-  uint32_t word = 0;  // count: 19 bits; stamp: 12; one of the exponent
+  static constexpr uint32_t kOld = 1u << 11;  // passes; what is older is kept at this age, so that ages never wrap
+  uint32_t tag = 0;                           // half of the cell's key; 0: empty
+  uint32_t word = 0;                          // count: 19 bits; stamp: 12; one of the exponent
   uint64_t packed = 0;
 
   uint32_t count() const { return word >> 13; }
   uint32_t stamp() const { return word >> 1 & (kStamps - 1); }  // when samples last came, modulo kStamps
+  /// Passes since samples last came; `now` and stamps are known modulo kStamps.
+  uint32_t age(uint32_t now) const { return (now - stamp()) & (kStamps - 1); }
+  void set_age(uint32_t passes, uint32_t now) {
+    word = (word & ~((kStamps - 1) << 1)) | ((now - passes) & (kStamps - 1)) << 1;
+  }
   /// Mean of irradiance / pi.
   Rgb light() const {
     const float unit = std::bit_cast<float>((uint32_t(packed >> 57) << 1 | (word & 1u)) << 23);

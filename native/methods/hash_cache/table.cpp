@@ -82,10 +82,11 @@ void Table::reserve(uint32_t p, size_t more, size_t most) {
   if (needed > count) resize(p, std::max(needed, std::min(most, count + count / 2)));
 }
 
-void Table::keep_younger(uint32_t p, uint32_t age, uint32_t stamp) {
+/// At most so many of them, whichever they are.
+void Table::keep_younger(uint32_t p, uint32_t age, uint32_t stamp, size_t most) {
   std::vector<Entry> kept;
   each(p, [&](const Entry& e) {
-    if (((stamp - e.record.stamp()) & (Record::kStamps - 1)) <= age) kept.push_back(e);
+    if (e.record.age(stamp) <= age && kept.size() < most) kept.push_back(e);
   });
   Store& store = stores_[p];
   std::fill(store.buckets.begin(), store.buckets.end(), Bucket{});
@@ -98,14 +99,29 @@ void Table::make_room(uint32_t p, size_t fresh, uint32_t stamp, TableCounts& cou
   const size_t most = most_cells(), used = stores_[p].used;
   if (used + fresh <= most) return;
   std::vector<uint32_t> with_age(Record::kStamps, 0);
-  each(p, [&](const Entry& e) { with_age[(stamp - e.record.stamp()) & (Record::kStamps - 1)]++; });
+  each(p, [&](const Entry& e) { with_age[e.record.age(stamp)]++; });
   const size_t wanted = most - std::min(most, std::max(fresh, most / 4));
   size_t kept = with_age[0];
   uint32_t age = 0;
   while (age + 1 < Record::kStamps && kept + with_age[age + 1] <= wanted) kept += with_age[++age];
-  if (kept == used) return;
-  counts.evicted += used - kept;
-  keep_younger(p, age, stamp);
+  if (kept == used && used <= most) return;
+  keep_younger(p, age, stamp, most);
+  counts.evicted += used - stores_[p].used;
+}
+
+void Table::set_limit(size_t bytes, uint32_t stamp) {
+  limit_ = bytes;
+  for (uint32_t p = 0; p < kParts; ++p) {
+    make_room(p, 0, stamp, counts_);
+    if (stores_[p].buckets.size() > most_buckets()) resize(p, most_buckets());
+  }
+}
+
+void Table::keep_ages(uint32_t stamp) {
+  static_assert(Record::kOld + kParts < Record::kStamps);
+  for (Bucket& bucket : stores_[stamp % kParts].buckets)
+    for (Record& r : bucket.cells)
+      if (r.tag && r.age(stamp) > Record::kOld) r.set_age(Record::kOld, stamp);
 }
 
 void Table::reduce(std::span<const Sample> samples, std::span<const KeyIndex> order, uint32_t stamp, uint32_t salt,
@@ -198,7 +214,7 @@ void Table::clear() {
 
 void Table::drop_older(uint32_t age, uint32_t stamp) {
   for (uint32_t p = 0; p < kParts; ++p)
-    if (stores_[p].used) keep_younger(p, age, stamp);
+    if (stores_[p].used) keep_younger(p, age, stamp, stores_[p].used);
 }
 
 size_t Table::size() const {

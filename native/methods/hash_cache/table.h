@@ -70,8 +70,11 @@ class Table {
   Table(const Table&) = delete;
   Table& operator=(const Table&) = delete;
   void clear();
-  /// Cells beyond this many bytes push out those that got no samples for the longest time; then new ones are refused.
-  void set_limit(size_t bytes) { limit_ = bytes; }
+  /// bytes() never exceeds this; cells beyond push out those that got no samples for the longest time, at once where
+  /// there are more already. Where all are fresh, new ones are refused.
+  void set_limit(size_t bytes, uint32_t stamp);
+  /// Once a pass: cells of one part after the other that are older than Record::kOld get that age.
+  void keep_ages(uint32_t stamp);
   /// Adds the samples to their cells, those of every level sums of the level's below, up to kTopLevel. Returns the
   /// number of cells that were touched.
   /// `mend`, if any, is shown each cell that is there already before it takes its samples.
@@ -122,7 +125,7 @@ class Table {
   void put(uint32_t part, const Entry&);
   void resize(uint32_t part, size_t buckets);
   void reserve(uint32_t part, size_t more, size_t most);  // most: buckets, unless more are needed
-  void keep_younger(uint32_t part, uint32_t age, uint32_t stamp);
+  void keep_younger(uint32_t part, uint32_t age, uint32_t stamp, size_t most);
   template <class Function>
   void each(uint32_t part, const Function& function) const;
   struct Reduced {
@@ -132,15 +135,18 @@ class Table {
   void reduce(std::span<const Sample> samples, std::span<const std::pair<uint64_t, uint32_t>> order, uint32_t stamp,
               uint32_t salt, const Mend& mend, uint32_t part, Reduced& out);
   void make_room(uint32_t part, size_t fresh, uint32_t stamp, TableCounts&);
-  size_t most_buckets() const { return std::max<size_t>(1, limit_ / (kParts * (sizeof(Bucket) + 16))); }
-  size_t most_cells() const { return most_buckets() * kFullest / kOf; }
+  size_t most_buckets() const {
+    return std::max<size_t>(1, (limit_ - std::min(limit_, sizeof(Table))) / (kParts * kBucketBytes));
+  }
+  size_t most_cells() const { return (most_buckets() - 1) * kFullest / kOf; }  // one bucket more: see reserve()
 
   static constexpr size_t kFullest = 5, kOf = 2;  // cells that a bucket holds on average, at most: 5/2
+  static constexpr size_t kBucketBytes = sizeof(Bucket) + 4 * sizeof(uint32_t);
   static constexpr Bucket kNothing{};
   std::array<Part, kParts> parts_;
   std::array<Store, kParts> stores_;
   uint32_t last_stamp_ = 0, adds_ = 0;  // calls of add with the same stamp
-  size_t limit_ = size_t(1) << 30;
+  size_t limit_ = size_t(1) << 40;      // none
   TableCounts counts_;
 };
 

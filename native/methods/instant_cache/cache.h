@@ -50,7 +50,6 @@ enum class View : uint8_t { kLight, kRecords, kChanges, kRays, kLights };
 
 /// Rather more than nothing, so that who was found covered is answered, whatever is rounded how.
 constexpr float kCoveringWeight = 1e-8f;
-constexpr float kAsItIs = 2.0f;  // an answer's weight: no light, a colour that is shown as it is
 
 /// Memory that threads use for one record after the other: a value for each light.
 struct Sums {
