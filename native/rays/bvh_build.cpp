@@ -15,6 +15,8 @@ namespace afterglow {
 
 RayCaster::State::State() : device(rtcNewDevice(nullptr)) {
   if (!device) throw Error("Embree cannot be started: error " + std::to_string(rtcGetDeviceError(nullptr)));
+  if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) together = 8;
+  if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) together = 16;
   rtcSetDeviceErrorFunction(
       device,
       [](void* self, RTCError code, const char* text) {

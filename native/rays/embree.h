@@ -13,6 +13,9 @@ namespace afterglow::embree {
 #if RTC_VERSION_MAJOR >= 4
 inline void closest(RTCScene scene, RTCRayHit& ray) { rtcIntersect1(scene, &ray); }
 inline void occluded(RTCScene scene, RTCRay& ray) { rtcOccluded1(scene, &ray); }
+inline void occluded(const int* valid, RTCScene scene, RTCRay4& rays) { rtcOccluded4(valid, scene, &rays); }
+inline void occluded(const int* valid, RTCScene scene, RTCRay8& rays) { rtcOccluded8(valid, scene, &rays); }
+inline void occluded(const int* valid, RTCScene scene, RTCRay16& rays) { rtcOccluded16(valid, scene, &rays); }
 #else
 inline void closest(RTCScene scene, RTCRayHit& ray) {
   RTCIntersectContext context;
@@ -23,6 +26,22 @@ inline void occluded(RTCScene scene, RTCRay& ray) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(scene, &context, &ray);
+}
+// Without the context's flag for rays that stay together: with it, rays through instances may never come back.
+inline void occluded(const int* valid, RTCScene scene, RTCRay4& rays) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded4(valid, scene, &context, &rays);
+}
+inline void occluded(const int* valid, RTCScene scene, RTCRay8& rays) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded8(valid, scene, &context, &rays);
+}
+inline void occluded(const int* valid, RTCScene scene, RTCRay16& rays) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded16(valid, scene, &context, &rays);
 }
 #endif
 

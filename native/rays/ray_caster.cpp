@@ -3,6 +3,8 @@
 // through Embree (Wald et al. 2014), kept as thin as it can be.
 #include "rays/ray_caster.h"
 
+#include <algorithm>
+
 #include "rays/ray_caster_state.h"
 #include "rays/ray_query.h"
 
@@ -31,5 +33,47 @@ bool RayCaster::closest(const Ray& ray, Hit& hit) const {
 }
 
 bool RayCaster::occluded(const Ray& ray) const { return ray_occluded(state_->root, ray); }
+
+namespace {
+
+/// N lanes of Embree's packet, some of them without a ray.
+template <class Packet, size_t N>
+uint32_t packet_occluded(RTCScene scene, std::span<const Ray> rays) {
+  alignas(64) int valid[N] = {};
+  alignas(64) Packet packet{};
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const Ray& ray = rays[i];
+    if (!usable(ray)) continue;
+    valid[i] = -1;
+    packet.org_x[i] = ray.origin.x, packet.org_y[i] = ray.origin.y, packet.org_z[i] = ray.origin.z;
+    packet.dir_x[i] = ray.direction.x, packet.dir_y[i] = ray.direction.y, packet.dir_z[i] = ray.direction.z;
+    packet.tnear[i] = ray.t_min, packet.tfar[i] = ray.t_max, packet.mask[i] = ray.mask;
+  }
+  embree::occluded(valid, scene, packet);
+  uint32_t hidden = 0;
+  for (size_t i = 0; i < rays.size(); ++i) hidden |= uint32_t(valid[i] && packet.tfar[i] < 0.0f) << i;
+  return hidden;
+}
+
+}  // namespace
+
+uint32_t RayCaster::occluded(std::span<const Ray> rays) const {
+  constexpr size_t kFew = 2;  // a packet's lanes cost more
+  uint32_t hidden = 0;
+  for (size_t i = 0; i < rays.size(); i += state_->together) {
+    const std::span<const Ray> part = rays.subspan(i, std::min(rays.size() - i, state_->together));
+    uint32_t found = 0;
+    if (part.size() <= kFew)
+      for (size_t j = 0; j < part.size(); ++j) found |= uint32_t(occluded(part[j])) << j;
+    else if (part.size() <= 4)
+      found = packet_occluded<RTCRay4, 4>(state_->root, part);
+    else if (part.size() <= 8)
+      found = packet_occluded<RTCRay8, 8>(state_->root, part);
+    else
+      found = packet_occluded<RTCRay16, 16>(state_->root, part);
+    hidden |= found << i;
+  }
+  return hidden;
+}
 
 }  // namespace afterglow

@@ -44,6 +44,7 @@ inline constexpr size_t kMostStillTriangles = 100'000;
 
 struct RayCaster::State {
   RTCDevice device = nullptr;
+  size_t together = 4;  // rays that one vector of this processor holds
   RTCScene top = nullptr;
   RTCScene flat = nullptr;              // common BVH, or none
   RTCGeometry flat_instance = nullptr;  // it in the top level

@@ -160,4 +160,14 @@ Rgb visibility(const WalkScene& walk, const Ray& ray, RayCounts& counts) {
   return transmittance(walk, ray, context, counts);
 }
 
+void visibility(const WalkScene& walk, std::span<const Ray> rays, std::span<Rgb> out, RayCounts& counts) {
+  if (walk.shown || walk.scene.effects.has(kTransparency)) {
+    for (size_t i = 0; i < rays.size(); ++i) out[i] = visibility(walk, rays[i], counts);
+    return;
+  }
+  counts.shadow += rays.size();
+  const uint32_t hidden = walk.scene.rays.occluded(rays);
+  for (size_t i = 0; i < rays.size(); ++i) out[i] = Rgb(hidden >> i & 1 ? 0.0f : 1.0f);
+}
+
 }  // namespace afterglow

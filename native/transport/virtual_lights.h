@@ -96,5 +96,7 @@ bool can_see(const Vec3& position, const Vec3& face_normal, const VirtualLight&,
 Ray visibility_ray(const Vec3& lifted_position, const VirtualLight&);
 /// Share of the light that arrives: exactly 0 or 1 where all that can be between is opaque.
 Rgb visibility(const WalkScene&, const Ray&, RayCounts&);
+/// The same of at most RayCaster::kTogether rays, from places side by side.
+void visibility(const WalkScene&, std::span<const Ray>, std::span<Rgb>, RayCounts&);
 
 }  // namespace afterglow

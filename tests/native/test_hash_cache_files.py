@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import afterglow
@@ -102,7 +103,7 @@ def test_a_cell_is_the_sum_of_its_children(tmp_path: Any) -> None:
     path = tmp_path / "cells"
     live.session.save_cache(str(path))
     levels = [cells_of(path.read_bytes(), level, 8 * 16) for level in (17, 18, 19)]
-    for children, parents in zip(levels, levels[1:], strict=False):
+    for children, parents in itertools.pairwise(levels):
         sums: dict[tuple[int, ...], list[Any]] = {}
         for (x, y, z, owner), (count, light) in children.items():
             total = sums.setdefault((x >> 1, y >> 1, z >> 1, owner), [0, np.zeros(3)])

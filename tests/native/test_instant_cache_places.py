@@ -11,20 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from afterglow.bench.instant_cache.rays import HEADER, LIGHT, RECORD
 from afterglow.scenes import Camera, Description, Light, look_at, node, rotate, scale, translate
 from afterglow.scenes.rooms import diffuse
 from afterglow.scenes.shapes import quad, sphere
 from test_instant_cache import Live, room
 
-# As native/methods/instant_cache/files.cpp writes them.
 FORMAT = 4
-HEADER = np.dtype([("magic", "S16"), ("format", "<u4"), ("slots", "<u4"), ("words", "<u4"), ("coloured", "<u4"),
-                   ("records", "<u8"), ("scene", "<u8"), ("lengths", "<f4", 7), ("settings", "<u4", 8), ("update", "<u4"),
-                   ("short_rays", "<u4"), ("end", "<u4")])
-LIGHT = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("face", "<f4", 3), ("rest", "<f4", 7), ("alive", "<u4")])
-RECORD = np.dtype([("instance", "<u4"), ("triangle", "<u4"), ("back", "<u4"), ("uv", "<f4", 2), ("position", "<f4", 3),
-                   ("normal", "<f4", 3), ("face", "<f4", 3), ("rest", "<f4", 28), ("measured", "<f4"), ("born", "<u4"),
-                   ("asked", "<u4"), ("rays", "<u4"), ("used", "<u4"), ("ready", "<u4"), ("wanted", "<u4")])
 
 
 class Saved:
@@ -80,13 +73,13 @@ def places_below(live: Live, points: np.ndarray, normals: np.ndarray) -> dict[st
 def test_records_exactly_at_virtual_lights(tmp_path: Path, bound: float) -> None:
     """The place and the normal of a light: the way between both has no length and no direction."""
     def at_lights(saved: Saved, first: Live) -> np.ndarray:
-        found = places_below(first, saved.records["position"], saved.records["face"])
+        found = places_below(first, saved.records["position"], saved.records["face_normal"])
         assert (found["instance"] == saved.records["instance"]).all() and (found["triangle"] == saved.records["triangle"]).all()
         lights = saved.lights[saved.lights["alive"] != 0]
         records = np.repeat(saved.records[:1], len(lights))
-        for name, values in places_below(first, lights["position"], lights["face"]).items():
+        for name, values in places_below(first, lights["position"], lights["face_normal"]).items():
             records[name] = values
-        for name in ("position", "normal", "face"):
+        for name in ("position", "normal", "face_normal"):
             records[name] = lights[name]
         return records
 
@@ -230,7 +223,7 @@ def test_a_clear_pane_takes_nothing_from_a_lamp_without_shadows(tmp_path: Path) 
         live.session.save_cache(str(tmp_path / "cache"))
         raw = (tmp_path / "cache").read_bytes()
         lights = np.frombuffer(raw, LIGHT, int(np.frombuffer(raw, HEADER, 1)["slots"][0]), HEADER.itemsize)
-        return float(lights["rest"][lights["position"][:, 1] > 3.9, 0].sum())
+        return float(lights["front"][lights["position"][:, 1] > 3.9, 0].sum())
 
     without, through = (np.array([on_wall(pane, pattern) for pattern in range(8)]) for pane in (False, True))
     spread = math.hypot(*(values.std(ddof=1) / 8**0.5 for values in (without, through)))

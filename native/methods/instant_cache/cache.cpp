@@ -15,9 +15,18 @@ namespace afterglow::instant_cache {
 
 namespace {
 
-constexpr size_t kRecordBlock = 4;  // 1024 rays or so
+constexpr size_t kRecordBlock = RayCaster::kTogether;
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+uint64_t spread_bits(uint64_t x) {  // every third bit
+  x &= 0x1fffff;
+  x = (x | x << 32) & 0x1f00000000ffffull;
+  x = (x | x << 16) & 0x1f0000ff0000ffull;
+  x = (x | x << 8) & 0x100f00f00f00f00full;
+  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
+  return (x | x << 2) & 0x1249249249249249ull;
+}
 
 /// Which points go first: a coarse grid of pixels, then finer ones, so that records stand apart.
 uint32_t round_of(const CachePoint& p) {
@@ -162,7 +171,22 @@ void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points
   counts_.seconds_fill += now() - begun;
 }
 
-uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> which, Work& work) {
+std::vector<uint32_t> Cache::along_curve(std::span<const uint32_t> which) const {
+  std::vector<std::pair<uint64_t, uint32_t>> order(which.size());
+  const float scale = float(1 << 20) / std::max(2.0f * radius_, 1e-30f);
+  for (size_t i = 0; i < which.size(); ++i) {
+    const Vec3 at = glm::clamp((records_[which[i]].position - center_ + radius_) * scale, Vec3(0.0f), Vec3(1048575.0f));
+    order[i] = {spread_bits(uint64_t(at.x)) | spread_bits(uint64_t(at.y)) << 1 | spread_bits(uint64_t(at.z)) << 2,
+                which[i]};
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<uint32_t> sorted(which.size());
+  for (size_t i = 0; i < which.size(); ++i) sorted[i] = order[i].second;
+  return sorted;
+}
+
+uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> records, Work& work) {
+  const std::vector<uint32_t> which = along_curve(records);
   std::atomic<uint64_t> rays{0};
   const WalkScene walked = walk(scene);
   const ShortRays nearby = short_rays(walked);
@@ -172,14 +196,14 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
         RayCounts counts;
         Sums sums;
         sums.terms.resize(lights_.padded());
-        for (size_t i = begin; i < end && !work.stop.stop(); ++i) {
+        const uint32_t changed = ask(walked, std::span(which).subspan(begin, end - begin), counts);
+        for (size_t i = begin; i < end; ++i) {
           Record& record = records_[which[i]];
           const Rgb compensation = record.compensation;
           if (settings_.lights.short_rays && !lazy_)
             record.compensation = nearby_.repair(which[i], nearby, record, counts);
           // Most of what an edit makes unknown turns out to be as it was: then so is the sum, to the last bit.
-          const bool changed = ask(walked, which[i], sums.terms.data(), counts);
-          if (changed || !record.summed || record.compensation != compensation) sum(which[i], sums);
+          if (changed >> (i - begin) & 1 || !record.summed || record.compensation != compensation) sum(which[i], sums);
           record.ready = true;
         }
         rays += counts.shadow + counts.bounce;
@@ -191,39 +215,76 @@ uint64_t Cache::resolve(const CommittedScene& scene, std::span<const uint32_t> w
   return rays;
 }
 
-bool Cache::ask(const WalkScene& walked, size_t index, float* terms, RayCounts& counts) {
-  Record& record = records_[index];
-  const uint64_t rays_before = counts.shadow;
-  bool changed = false;
-  const Vec3 from = record.position + record.error * record.face_normal;
-  uint64_t *unknown = visibility_.unknown(index), *facing = visibility_.facing(index);
-  const bool few = moved_rays_ && index * visibility_.words() < only_moved_.size();
+uint32_t Cache::ask(const WalkScene& walked, std::span<const uint32_t> which, RayCounts& counts) {
+  constexpr size_t kMost = RayCaster::kTogether;
+  std::array<Vec3, kMost> from;
+  std::array<uint32_t, kMost> rays{};
+  std::array<uint64_t, kMost> asked;
+  uint32_t changed = 0;
+  for (size_t i = 0; i < which.size(); ++i) from[i] = lifted(records_[which[i]]);
   for (uint32_t w = 0; w < visibility_.words(); ++w) {
-    if (!unknown[w]) continue;
-    geometry_terms(lights_, record.position, record.normal, bound_, terms + 64 * w, 64 * w,
-                   std::min(lights_.padded() - 64 * w, 64u));
-    const uint64_t quick = few ? only_moved_[index * visibility_.words() + w] : 0;
-    for (uint64_t bits = unknown[w]; bits; bits &= bits - 1) {
-      const uint64_t bit = bits & -bits;
-      const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
-      const VirtualLight& light = lights_.lights[k];
-      const float g = terms[k];
-      const bool shines = g > 0.0f ? front_[w] & bit : g < 0.0f && (back_[w] & bit);
-      const bool asks = shines && can_see(record.position, record.face_normal, light, g > 0.0f);
-      facing[w] = asks ? facing[w] | bit : facing[w] & ~bit;
-      if (asks && (quick & bit)) {  // was seen, and nothing else can hide it
-        counts.shadow++;
-        if (moved_rays_->occluded(visibility_ray(from, light))) changed |= visibility_.set(index, k, Rgb(0.0f));
-      } else {
-        changed |=
-            visibility_.set(index, k, asks ? visibility(walked, visibility_ray(from, light), counts) : Rgb(0.0f));
+    uint64_t any = 0;
+    for (size_t i = 0; i < which.size(); ++i) {
+      const uint64_t quick = moved_rays_ && which[i] * visibility_.words() < only_moved_.size()
+                                 ? only_moved_[which[i] * visibility_.words() + w]
+                                 : 0;
+      bool other = false;
+      asked[i] = wanted_rays(which[i], w, other);
+      for (uint64_t bits = asked[i] & quick; bits; bits &= bits - 1) {  // were seen, and nothing else can hide them
+        const uint32_t k = w * 64 + uint32_t(std::countr_zero(bits));
+        counts.shadow++, rays[i]++;
+        if (moved_rays_->occluded(visibility_ray(from[i], lights_.lights[k])))
+          other |= visibility_.set(which[i], k, Rgb(0.0f));
+      }
+      asked[i] &= ~quick;
+      any |= asked[i];
+      changed |= uint32_t(other) << i;
+    }
+    for (; any; any &= any - 1) {  // to one light from all that ask for it
+      const uint64_t bit = any & -any;
+      const uint32_t k = w * 64 + uint32_t(std::countr_zero(any));
+      std::array<Ray, kMost> ray;
+      std::array<Rgb, kMost> seen;
+      std::array<uint8_t, kMost> whose;
+      size_t count = 0;
+      for (size_t i = 0; i < which.size(); ++i)
+        if (asked[i] & bit) ray[count] = visibility_ray(from[i], lights_.lights[k]), whose[count++] = uint8_t(i);
+      visibility(walked, std::span(ray).first(count), seen, counts);
+      for (size_t j = 0; j < count; ++j) {
+        rays[whose[j]]++;
+        changed |= uint32_t(visibility_.set(which[whose[j]], k, seen[j])) << whose[j];
       }
     }
-    unknown[w] = 0;
   }
-  record.rays = uint32_t(counts.shadow - rays_before);
-  if (record.rays) record.asked = update_;
+  for (size_t i = 0; i < which.size(); ++i) {
+    Record& record = records_[which[i]];
+    record.rays = rays[i];
+    if (record.rays) record.asked = update_;
+  }
   return changed;
+}
+
+uint64_t Cache::wanted_rays(size_t index, uint32_t w, bool& changed) {
+  uint64_t &unknown = visibility_.unknown(index)[w], &facing = visibility_.facing(index)[w];
+  if (!unknown) return 0;
+  const Record& record = records_[index];
+  float terms[64];
+  geometry_terms(lights_, record.position, record.normal, bound_, terms, 64 * w,
+                 std::min(lights_.padded() - 64 * w, 64u));
+  uint64_t wanted = 0;
+  for (uint64_t bits = unknown; bits; bits &= bits - 1) {
+    const uint64_t bit = bits & -bits;
+    const uint32_t slot = uint32_t(std::countr_zero(bits)), k = w * 64 + slot;
+    const float g = terms[slot];
+    const bool shines = g > 0.0f ? front_[w] & bit : g < 0.0f && (back_[w] & bit);
+    if (shines && can_see(record.position, record.face_normal, lights_.lights[k], g > 0.0f))
+      wanted |= bit;
+    else
+      changed |= visibility_.set(index, k, Rgb(0.0f));
+  }
+  facing = (facing & ~unknown) | wanted;
+  unknown = 0;
+  return wanted;
 }
 
 Verification Cache::verify(const CommittedScene& scene, Work& work) const {
@@ -241,15 +302,23 @@ Verification Cache::verify(const CommittedScene& scene, Work& work) const {
       Record fresh = stored;
       if (!locate(scene.scene, fresh)) continue;
       geometry_terms(lights_, fresh.position, fresh.normal, bound_, terms.data());
-      const Vec3 from = fresh.position + fresh.error * fresh.face_normal;
       Rgb sum(0.0f);
       for (uint32_t k = 0; k < lights_.count; ++k) {
         const float g = terms[k];
         const Rgb& light = g > 0.0f ? lights_.lights[k].front : lights_.lights[k].back;
         if (g == 0.0f || is_black(light) || !can_see(fresh.position, fresh.face_normal, lights_.lights[k], g > 0.0f))
           continue;
-        Rgb seen = visibility(walked, visibility_ray(from, lights_.lights[k]), counts);
-        if (visibility_.coloured()) seen = unpack_transmittance(pack_transmittance(seen));
+        const Rgb kept = visibility_.get(i, k);
+        const auto ask = [&](const Vec3& from) {
+          const Rgb seen = visibility(walked, visibility_ray(from, lights_.lights[k]), counts);
+          return visibility_.coloured() ? unpack_transmittance(pack_transmittance(seen)) : seen;
+        };
+        Rgb seen = ask(lifted(fresh));
+        // A ray that passes an edge within rounding may be told either, alone or among others.
+        const float rounding = 2e-6f * max_component(glm::abs(fresh.position) + glm::abs(lights_.lights[k].position));
+        const Frame frame(fresh.face_normal);
+        for (const Vec3& way : {frame.t, -frame.t, frame.b, -frame.b})
+          if (seen != kept && ask(lifted(fresh) + rounding * way) == kept) seen = kept;
         sum += std::fabs(g) * light * seen;
       }
       sum += nearby.gather(short_ray_place(fresh), stops, counts);

@@ -117,9 +117,13 @@ class Cache {
   void find_open(std::span<const CachePoint>, std::span<const uint32_t> asked, uint8_t* open) const;
   bool insert(const CommittedScene&, const CachePoint&);
   /// Asks what is unknown of these records and sums their light anew.
+  /// These records along a curve that keeps neighbours together.
+  std::vector<uint32_t> along_curve(std::span<const uint32_t>) const;
   uint64_t resolve(const CommittedScene&, std::span<const uint32_t> records, Work&);
-  /// Asks what is unknown. Whether anything is seen otherwise than before.
-  bool ask(const WalkScene&, size_t record, float* terms, RayCounts&);
+  /// Asks what is unknown of at most RayCaster::kTogether records. Bits: those that see anything otherwise than before.
+  uint32_t ask(const WalkScene&, std::span<const uint32_t> records, RayCounts&);
+  /// Which unknown lights of a word face the record: the others are known by that. Clears the word.
+  uint64_t wanted_rays(size_t record, uint32_t word, bool& changed);
   void sum(size_t record, Sums&);
   void find_seen(size_t record, Sums&) const;
   float find_radius(const Record&, Sums&) const;

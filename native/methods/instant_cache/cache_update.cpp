@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <numeric>
 #include <utility>
 
 #include "base/parallel.h"
@@ -27,15 +28,6 @@ constexpr uint32_t kGroup = 16;         // records that are tested together
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 void set_bit(std::vector<uint64_t>& bits, uint32_t k) { bits[k / 64] |= uint64_t(1) << (k % 64); }
-
-uint64_t spread_bits(uint64_t x) {  // every third bit
-  x &= 0x1fffff;
-  x = (x | x << 32) & 0x1f00000000ffffull;
-  x = (x | x << 16) & 0x1f0000ff0000ffull;
-  x = (x | x << 8) & 0x100f00f00f00f00full;
-  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
-  return (x | x << 2) & 0x1249249249249249ull;
-}
 
 bool same_walk(const WalkLimits& a, const WalkLimits& b) {
   return a.max_bounces == b.max_bounces && a.diffuse == b.diffuse && a.transparent == b.transparent &&
@@ -311,13 +303,9 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
     for (size_t i = 0; i < records_.size(); ++i) mark(i, every);
     return;
   }
-  std::vector<std::pair<uint64_t, uint32_t>> order(records_.size());
-  const float scale = float(1 << 20) / std::max(2.0f * radius_, 1e-30f);
-  for (uint32_t i = 0; i < records_.size(); ++i) {
-    const Vec3 at = glm::clamp((records_[i].position - center_ + radius_) * scale, Vec3(0.0f), Vec3(1048575.0f));
-    order[i] = {spread_bits(uint64_t(at.x)) | spread_bits(uint64_t(at.y)) << 1 | spread_bits(uint64_t(at.z)) << 2, i};
-  }
-  std::sort(order.begin(), order.end());
+  std::vector<uint32_t> order(records_.size());
+  std::iota(order.begin(), order.end(), 0u);
+  order = along_curve(order);
   const uint32_t words = visibility_.words();
   // Rays begin and end a little above the faces: all boxes are taken as much larger.
   float lift = 0.0f, error = 0.0f;
@@ -337,18 +325,18 @@ void Cache::mark_crossings(const std::vector<Moved>& moved, Work& work) {
   only_moved_.assign(solid ? records_.size() * words : 0, 0);
   parallel_blocks(order.size(), kGroup, work.threads, [&](size_t begin, size_t end) {
     Box around;
-    for (size_t i = begin; i < end; ++i) around.extend(records_[order[i].second].position);
+    for (size_t i = begin; i < end; ++i) around.extend(records_[order[i]].position);
     std::vector<uint64_t> bits(words * 4);
     uint64_t *darker = bits.data(), *brighter = darker + words, *near = brighter + words, *crosses = near + words;
     for (size_t i = begin; i < end; ++i)
       for (uint32_t w = 0; w < words; ++w) {
-        const size_t row = order[i].second;
+        const size_t row = order[i];
         darker[w] |= visibility_.could_darken(row, w), brighter[w] |= visibility_.could_brighten(row, w);
       }
     for (const Place& place : places) {
       if (!place.crossing.box(around.center(), 0.5f * around.size(), place.old ? brighter : darker, near)) continue;
       for (size_t i = begin; i < end; ++i) {
-        const size_t row = order[i].second;
+        const size_t row = order[i];
         uint64_t* unknown = visibility_.unknown(row);
         for (uint32_t w = 0; w < words; ++w)
           crosses[w] = near[w] & ~unknown[w] &

@@ -42,6 +42,8 @@ struct Record {
   Rgb compensation{0.0f};                  // what short rays found; irradiance holds it already
 };
 
+/// Where its rays start.
+inline Vec3 lifted(const Record& record) { return record.position + record.error * record.face_normal; }
 /// Where the place is now. False: the triangle has no area.
 bool locate(const Scene&, Record&);
 Place place_of(const Scene&, const CachePoint&);

@@ -3,6 +3,7 @@
 // Equations: Debattista et al. 2009, (1) with radiant intensities normalised by light paths, (2), (3).
 #include "methods/instant_radiosity/instant_radiosity.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <mutex>
@@ -63,22 +64,31 @@ class InstantRadiosity final : public IndirectMethod {
   void gather(const CommittedScene& scene, std::span<const CachePoint> points,
               std::span<Answer> answers) const override {
     RayCounts counts;
-    std::vector<float> terms(whole_.padded());
-    std::vector<ShortRayStop> stops;
     const WalkScene walked = walk(scene);
-    const VirtualLightSettings& s = lights_settings_;
-    const ShortRays nearby(walked, whole_, plan_slots(s.count, s.options(settings_.limits, 0).bounces), bound_,
-                           s.short_rays);
-    for (size_t i = 0; i < points.size(); ++i) {
+    std::array<std::vector<uint32_t>, kParts + 1> asking;  // points that ask a part of the lights, and all of them
+    for (uint32_t i = 0; i < points.size(); ++i) {
       const CachePoint& p = points[i];
       const bool shares = lights_settings_.interleave && p.layer == 0 && !p.translucent;
-      const uint32_t part = (p.x % kInterleave + kInterleave * (p.y % kInterleave) + p.sample) % kParts;
-      Rgb e = shares ? float(kParts) * irradiance(walked, parts_[part], p, terms, counts)
-                     : irradiance(walked, whole_, p, terms, counts);
-      if (s.short_rays)
-        e += nearby.gather({p.position, p.bent, p.face_normal, p.error, hash(hash(p.x, p.y, p.sample), p.layer)}, stops,
-                           counts);
-      answers[i] = {e, 1.0f, 0.0f};
+      asking[shares ? (p.x % kInterleave + kInterleave * (p.y % kInterleave) + p.sample) % kParts : kParts].push_back(
+          i);
+    }
+    std::vector<float> terms;
+    for (uint32_t part = 0; part <= kParts; ++part) {
+      const std::span<const uint32_t> all = asking[part];
+      for (size_t i = 0; i < all.size(); i += RayCaster::kTogether)
+        gather_together(walked, part, points, all.subspan(i, std::min(all.size() - i, RayCaster::kTogether)), answers,
+                        terms, counts);
+    }
+    const VirtualLightSettings& s = lights_settings_;
+    if (s.short_rays) {
+      std::vector<ShortRayStop> stops;
+      const ShortRays nearby(walked, whole_, plan_slots(s.count, s.options(settings_.limits, 0).bounces), bound_,
+                             s.short_rays);
+      for (size_t i = 0; i < points.size(); ++i) {
+        const CachePoint& p = points[i];
+        const uint32_t number = hash(hash(p.x, p.y, p.sample), p.layer);
+        answers[i].light += nearby.gather({p.position, p.bent, p.face_normal, p.error, number}, stops, counts);
+      }
     }
     const std::lock_guard lock(mutex_);
     gather_rays_ += counts;
@@ -98,20 +108,36 @@ class InstantRadiosity final : public IndirectMethod {
     return {scene, settings_.limits, shown_.empty() ? nullptr : &shown_, false};
   }
 
-  Rgb irradiance(const WalkScene& walked, const VirtualLightColumns& lights, const CachePoint& p,
-                 std::vector<float>& terms, RayCounts& counts) const {
-    geometry_terms(lights, p.position, p.bent, bound_, terms.data());
-    const Vec3 lifted = p.position + p.error * p.face_normal;
-    Rgb sum(0.0f);
+  /// Points that ask the same lights stand three pixels apart: their rays to each light stay together.
+  void gather_together(const WalkScene& walked, uint32_t part, std::span<const CachePoint> points,
+                       std::span<const uint32_t> which, std::span<Answer> answers, std::vector<float>& terms,
+                       RayCounts& counts) const {
+    const VirtualLightColumns& lights = part < kParts ? parts_[part] : whole_;
+    const size_t row = lights.padded();
+    terms.resize(which.size() * row);
+    std::array<Rgb, RayCaster::kTogether> sums{};
+    for (size_t i = 0; i < which.size(); ++i)
+      geometry_terms(lights, points[which[i]].position, points[which[i]].bent, bound_, terms.data() + i * row);
+    std::array<Ray, RayCaster::kTogether> rays;
+    std::array<Rgb, RayCaster::kTogether> brings, seen;
+    std::array<uint32_t, RayCaster::kTogether> whose;
     for (uint32_t k = 0; k < lights.count; ++k) {
-      const float g = terms[k];
-      if (g == 0.0f) continue;
       const VirtualLight& light = lights.lights[k];
-      const Rgb& intensity = g > 0.0f ? light.front : light.back;
-      if (is_black(intensity) || !can_see(p.position, p.face_normal, light, g > 0.0f)) continue;
-      sum += std::fabs(g) * intensity * visibility(walked, visibility_ray(lifted, light), counts);
+      size_t asked = 0;
+      for (uint32_t i = 0; i < which.size(); ++i) {
+        const float g = terms[i * row + k];
+        if (g == 0.0f) continue;
+        const CachePoint& p = points[which[i]];
+        const Rgb& intensity = g > 0.0f ? light.front : light.back;
+        if (is_black(intensity) || !can_see(p.position, p.face_normal, light, g > 0.0f)) continue;
+        rays[asked] = visibility_ray(p.position + p.error * p.face_normal, light);
+        brings[asked] = std::fabs(g) * intensity, whose[asked++] = i;
+      }
+      visibility(walked, std::span(rays).first(asked), seen, counts);
+      for (size_t j = 0; j < asked; ++j) sums[whose[j]] += brings[j] * seen[j];
     }
-    return sum;
+    const float share = part < kParts ? float(kParts) : 1.0f;
+    for (size_t i = 0; i < which.size(); ++i) answers[which[i]] = {share * sums[i], 1.0f, 0.0f};
   }
 
   WalkSettings settings_;

@@ -17,14 +17,15 @@ from ..figure import Context, Figure
 from .animations import MOVING
 from .watched import Watched
 
-HEADER = np.dtype([("magic", "S16"), ("plan", "<u4", 4), ("records", "<u8"), ("scene", "<u8"), ("lengths", "<f4", 7),
-                   ("settings", "<u4", 8), ("update", "<u4"), ("unused", "<u4"), ("rest", "<u4")])
+HEADER = np.dtype([("magic", "S16"), ("format", "<u4"), ("slots", "<u4"), ("words", "<u4"), ("coloured", "<u4"),
+                   ("records", "<u8"), ("scene", "<u8"), ("lengths", "<f4", 7), ("settings", "<u4", 8), ("update", "<u4"),
+                   ("short_rays", "<u4"), ("end", "<u4")])
 LIGHT = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("face_normal", "<f4", 3), ("front", "<f4", 3),
                   ("back", "<f4", 3), ("lift", "<f4"), ("alive", "<u4")])
 RECORD = np.dtype([("instance", "<u4"), ("triangle", "<u4"), ("back", "<u4"), ("uv", "<f4", 2), ("position", "<f4", 3),
                    ("normal", "<f4", 3), ("face_normal", "<f4", 3), ("irradiance", "<f4", 3), ("gradients", "<f4", 18),
-                   ("lengths", "<f4", 4), ("measured", "<f4"), ("born", "<u4"), ("asked", "<u4"), ("rays", "<u4"),
-                   ("used", "<u4"), ("ready", "<u4"), ("wanted", "<u4")])
+                   ("lengths", "<f4", 4), ("compensation", "<f4", 3), ("measured", "<f4"), ("born", "<u4"),
+                   ("asked", "<u4"), ("rays", "<u4"), ("used", "<u4"), ("ready", "<u4"), ("wanted", "<u4")])
 
 
 @dataclass
@@ -42,7 +43,7 @@ def saved(watched: Watched) -> Saved:
         watched.session.save_cache(str(path))
         data = path.read_bytes()
     head = np.frombuffer(data, HEADER, 1)[0]
-    slots, count = int(head["plan"][1]), int(head["records"])
+    slots, count = int(head["slots"]), int(head["records"])
     lights = np.frombuffer(data, LIGHT, slots, HEADER.itemsize)
     return Saved(int(head["update"]), lights, np.frombuffer(data, RECORD, count, HEADER.itemsize + lights.nbytes))
 
