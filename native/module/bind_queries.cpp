@@ -92,15 +92,21 @@ py::dict intersect(const PyScene& self, const py::handle& origins, const py::han
   return out;
 }
 
-py::array_t<bool> occluded(const PyScene& self, const py::handle& origins, const py::handle& targets) {
+py::array_t<bool> occluded(const PyScene& self, const py::handle& origins, const py::handle& targets, size_t together) {
+  if (together < 1 || together > RayCaster::kTogether)
+    throw InvalidInput("occluded: together must be 1 to " + std::to_string(RayCaster::kTogether));
   const RayInput in = ray_input(origins, targets, "targets");
   py::array_t<bool> out(static_cast<py::ssize_t>(in.count));
   bool* hidden = out.mutable_data();
   const py::gil_scoped_release free;
   const auto lock = reading(self);
   const std::vector<Ray> rays = rays_of(in, self.core->scene.origin(), true);
-  parallel_blocks(in.count, 4096, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) hidden[i] = self.core->rays.occluded(rays[i]);
+  parallel_blocks(in.count, 256 * together, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; i += together) {
+      const std::span<const Ray> group = std::span(rays).subspan(i, std::min(end - i, together));
+      const uint32_t found = together > 1 ? self.core->rays.occluded(group) : self.core->rays.occluded(rays[i]);
+      for (size_t j = 0; j < group.size(); ++j) hidden[i + j] = found >> j & 1;
+    }
   });
   return out;
 }
@@ -310,7 +316,7 @@ py::array_t<float> sobol_points(py::ssize_t count, py::ssize_t dimensions, uint3
 
 void bind_queries(py::module_& m, py::class_<PyScene, std::shared_ptr<PyScene>>& scene) {
   scene.def("intersect", &intersect, py::arg("origins"), py::arg("directions"))
-      .def("occluded", &occluded, py::arg("origins"), py::arg("targets"))
+      .def("occluded", &occluded, py::arg("origins"), py::arg("targets"), py::arg("together") = 1)
       .def("surface", &surface, py::arg("origins"), py::arg("directions"))
       .def("camera_rays", &camera_rays, py::arg("pixels"), py::arg("lens"), py::arg("width"), py::arg("height"))
       .def("changes_since", &changes_since, py::arg("version"))

@@ -199,7 +199,8 @@ class Scene:
     def bytes(self) -> dict[str, int]: ...      # memory by table, BVH included
     def intersect(self, origins: NDArray[np.float64], directions: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
         """Closest hits of N rays: distance (inf: none), instance, triangle, barycentric (N, 2), normal (N, 3)."""
-    def occluded(self, origins: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.bool_]: ...
+    def occluded(self, origins: NDArray[np.float64], targets: NDArray[np.float64], together: int = 1) -> NDArray[np.bool_]:
+        """Whether anything is between N pairs of places; `together` (1 to 16) rays are asked at once."""
     @property
     def origin(self) -> tuple[float, float, float]: ...  # what kernels' 32-bit coordinates are relative to
     def surface(self, origins: NDArray[np.float64], directions: NDArray[np.float64]) -> dict[str, NDArray[Any]]:

@@ -87,7 +87,8 @@ def check_against_brute_force(scene: Any, objects: dict[int, Any], random: np.ra
     assert (hit["instance"] == owner)[same].mean() >= 0.99
     targets = origins + ways * 4.0
     near = np.abs(distance - 4.0) < 1e-2
-    assert (scene.occluded(origins, targets) == (distance < 4.0))[same & ~near].all()
+    for together in (1, 2, 3, 7, 16):
+        assert (scene.occluded(origins, targets, together=together) == (distance < 4.0))[same & ~near].all()
 
 
 @pytest.mark.parametrize("flatten", [False, True, "still"])
@@ -283,6 +284,10 @@ def test_non_finite_rays_hit_nothing(ag) -> None:
         for way in ([0, 0, bad], [bad, 0, -1], [0, 0, 0]):
             assert scene.intersect([[0.5, 0.4, 1]], [way])["instance"][0] == 0
             assert not scene.occluded([[0.5, 0.4, 1]], [[0.5, 0.4, bad]])[0]
+        for together in (3, 5, 16):  # beside others, which are hit
+            targets = [[0.5, 0.4, bad if i % 3 == 1 else -1.0] for i in range(20)]
+            hidden = scene.occluded([[0.5, 0.4, 1]] * 20, targets, together=together)
+            assert hidden.tolist() == [i % 3 != 1 for i in range(20)]
 
 
 def test_normals(ag) -> None:
