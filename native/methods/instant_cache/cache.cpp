@@ -101,10 +101,10 @@ bool Cache::covered(const CachePoint& p) const {
   return found;
 }
 
-bool Cache::insert(const CommittedScene& scene, const CachePoint& p) {
+void Cache::insert(const CommittedScene& scene, const CachePoint& p) {
   Record record;
   record.place = place_of(scene.scene, p);
-  if (!locate(scene.scene, record)) return false;
+  if (!locate(scene.scene, record)) return;
   record.footprint = p.footprint;
   record.reach = record.radius = std::max(spacing_.most_pixels * p.footprint, 1e-6f * radius_);
   record.born = record.asked = update_;
@@ -117,7 +117,6 @@ bool Cache::insert(const CommittedScene& scene, const CachePoint& p) {
   visibility_.add_row();
   if (settings_.lights.short_rays) nearby_.add_row();
   counts_.created++;
-  return true;
 }
 
 void Cache::fill(const CommittedScene& scene, std::span<const CachePoint> points, Work& work) {

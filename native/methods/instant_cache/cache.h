@@ -115,7 +115,7 @@ class Cache {
   bool covered(const CachePoint&) const;
   /// A byte for each of the points that are asked for: whether no record covers it.
   void find_open(std::span<const CachePoint>, std::span<const uint32_t> asked, uint8_t* open) const;
-  bool insert(const CommittedScene&, const CachePoint&);
+  void insert(const CommittedScene&, const CachePoint&);
   /// Asks what is unknown of these records and sums their light anew.
   /// These records along a curve that keeps neighbours together.
   std::vector<uint32_t> along_curve(std::span<const uint32_t>) const;
