@@ -8,6 +8,7 @@
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "base/errors.h"
 
@@ -52,7 +53,7 @@ struct Task {
     }
     const std::lock_guard lock(mutex);
     if (stop) denoiser.reset();
-    failure = caught;
+    failure = std::move(caught);  // whoever waits holds it alone, and ends it
     done = true;
     changed.notify_all();
   }
@@ -93,7 +94,7 @@ void run_denoise_task(std::shared_ptr<Denoiser>& denoiser, DenoiserMaker make,
     throw Cancelled("denoising was cancelled");
   }
   denoiser = std::move(task->denoiser);
-  if (task->failure) std::rethrow_exception(task->failure);
+  if (task->failure) std::rethrow_exception(std::exchange(task->failure, nullptr));
 }
 
 }  // namespace afterglow
