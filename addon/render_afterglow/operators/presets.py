@@ -21,7 +21,7 @@ QUALITIES = {
     ),
     "OBJECTS": dict(
         method="INSTANT_CACHE", accuracy=0.0, samples=4, denoise=True, use_animated_seed=True,
-        instant_cache=dict(virtual_lights=512, light_compensation=32, light_bound=4.0, cache_first=16),
+        instant_cache=dict(virtual_lights=512, light_compensation=24, light_bound=4.0, cache_first=12),
     ),
 }
 ANIMATIONS = {"CAMERA", "OBJECTS"}  # they want persistent data

@@ -11,8 +11,8 @@ from ..foundation.viewport import OBJECT, STEP
 # As the add-on's preset for animations in which objects move.
 COOKER = Animation(
     "the cooker moves", {"op": "animate", "object": OBJECT, "step": float(STEP)},
-    {"method": "INSTANT_CACHE", "samples": 4, "accuracy": 0.0, "denoise": True, "virtual_lights": 512, "light_compensation": 32,
-     "light_bound": 4.0, "cache_first": 16},
+    {"method": "INSTANT_CACHE", "samples": 4, "accuracy": 0.0, "denoise": True, "virtual_lights": 512, "light_compensation": 24,
+     "light_bound": 4.0, "cache_first": 12},
     rival_samples=4, error=0.01, sooner=5, frames=range(1, LAST + 1))
 
 
