@@ -25,11 +25,12 @@ def ensure(version: str) -> Path:
     folder = FOLDER / release
     python = folder / "bin" / "python"
     done = folder / ".complete"
-    if done.is_file() and python.exists():
-        return python
+    # Asked first: a venv that is there may have been made by another system's Python.
     where = subprocess.run([PYTHON, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"], capture_output=True, text=True)
     if where.stdout.strip() != "3.11":
         raise Unavailable(f"bpy {release} needs Python 3.11, {PYTHON} is {where.stdout.strip()}")
+    if done.is_file() and python.exists():
+        return python
     print(f"Making {folder} with the official Blender {release} from PyPI (about 350 MB)", file=sys.stderr, flush=True)
     subprocess.run([PYTHON, "-m", "venv", "--clear", str(folder)], check=True)
     for _ in range(3):

@@ -118,7 +118,7 @@ def test_a_click_prepares_an_animation(in_blender: Run) -> None:
         """
     )
     assert found["camera"] == ["HASH_CACHE", 1, 3.0, True, 7]
-    assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 32, 16]
+    assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 24, 12]
 
 
 def test_viewports_better_the_lights_of_a_cache(in_blender: Run) -> None:
