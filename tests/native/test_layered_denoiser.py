@@ -130,6 +130,7 @@ def test_who_does_not_use_it_keeps_nothing_for_it() -> None:
         session.read("denoise_surface")
 
 
+@pytest.mark.timing
 def test_a_stop_is_obeyed() -> None:
     """At once, though much is left to do. Of several tries the best counts: a loaded machine keeps threads waiting."""
     built = Built(scenes.make("cornell_box"))

@@ -331,6 +331,7 @@ def test_a_viewport_starts_as_coarse_as_the_machine_needs_and_ends_with_the_same
     np.testing.assert_array_equal(*pictures)
 
 
+@pytest.mark.timing
 @pytest.mark.parametrize("method", ["PATH_TRACING", "INSTANT_CACHE", "HASH_CACHE"])
 def test_progress_tells_of_one_long_pass_and_cancel_is_obeyed_in_it(method: str) -> None:
     """Filling a cache and further camera samples are parts of the way: nothing stands at its end for long."""
