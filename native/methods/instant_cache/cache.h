@@ -116,9 +116,9 @@ class Cache {
   /// A byte for each of the points that are asked for: whether no record covers it.
   void find_open(std::span<const CachePoint>, std::span<const uint32_t> asked, uint8_t* open) const;
   void insert(const CommittedScene&, const CachePoint&);
-  /// Asks what is unknown of these records and sums their light anew.
   /// These records along a curve that keeps neighbours together.
   std::vector<uint32_t> along_curve(std::span<const uint32_t>) const;
+  /// Asks what is unknown of these records and sums their light anew.
   uint64_t resolve(const CommittedScene&, std::span<const uint32_t> records, Work&);
   /// Asks what is unknown of at most RayCaster::kTogether records. Bits: those that see anything otherwise than before.
   uint32_t ask(const WalkScene&, std::span<const uint32_t> records, RayCounts&);
