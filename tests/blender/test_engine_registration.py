@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 Run = Callable[..., dict[str, Any]]
 
 
@@ -119,6 +121,25 @@ def test_a_click_prepares_an_animation(in_blender: Run) -> None:
     )
     assert found["camera"] == ["HASH_CACHE", 1, 3.0, True, 7]
     assert found["objects"] == ["INSTANT_CACHE", 0.0, 512, 24, 12]
+
+
+def test_presets_of_animations_are_what_the_bench_measures(in_blender: Run, library: Path) -> None:
+    """Both have a figure `frames`: its settings are those that a click gives."""
+    from afterglow.bench.hash_cache.frames import WALK
+    from afterglow.bench.instant_cache.frames import COOKER
+
+    found = in_blender(
+        """
+        s = bpy.context.scene
+        s.render.engine = 'AFTERGLOW'
+        for quality in 'CAMERA', 'OBJECTS':
+            bpy.ops.afterglow.quality(quality=quality)
+            result(**{quality: addon('properties.scene').session_settings(s, False)})
+        """
+    )
+    for quality, animation in (("CAMERA", WALK), ("OBJECTS", COOKER)):
+        measured = {name: value for name, value in animation.ours.items() if name != "denoise"}  # no denoiser, no such setting
+        assert {name: found[quality][name] for name in measured} == pytest.approx(measured)
 
 
 def test_viewports_better_the_lights_of_a_cache(in_blender: Run) -> None:
