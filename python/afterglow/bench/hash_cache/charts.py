@@ -76,6 +76,7 @@ def charts(figures: list[dict[str, Any]]) -> dict[str, str]:
 
 def main(arguments: list[str]) -> None:
     folder = Path(arguments[0]) if arguments else FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
     for name, text in charts(recorded("hash_cache", arguments[1:])).items():
         (folder / name).write_text(text)
         print(folder / name)
