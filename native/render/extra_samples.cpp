@@ -3,6 +3,7 @@
 #include "render/extra_samples.h"
 
 #include <algorithm>
+#include <cfloat>
 
 #include "base/parallel.h"
 #include "base/sampler.h"
@@ -12,6 +13,8 @@ namespace afterglow {
 namespace {
 
 constexpr uint32_t kMostTimes = 64;  // samples beyond a pixel's own, for each of those
+constexpr float kMiddleGrey = 0.18f;
+constexpr float kWorth = 5.0f;       // of an `extra`: samples for each own one where one has a shown deviation of 1
 constexpr int kHalvings = 24;
 
 /// Sums over 3 × 3 pixels with binomial weights.
@@ -25,11 +28,19 @@ std::vector<float> deviations(const std::vector<PixelNoise>& pixels, uint32_t wi
                               DeviationUnit unit, StopToken stop) {
   double total = 0.0;
   uint64_t known = 0;
-  for (const PixelNoise& p : pixels)
-    if (p.samples) total += double(p.sum + p.seen) / p.samples, ++known;
+  std::vector<float> lit;
+  for (const PixelNoise& p : pixels) {
+    if (!p.samples) continue;
+    const float level = (p.sum + p.seen) / float(p.samples);
+    total += level, ++known;
+    if (level > 0.0f) lit.push_back(level);
+  }
   std::vector<float> found(pixels.size(), 0.0f);
   if (!known || !(total > 0.0)) return found;
   const float bright = 2.0f * float(total / double(known)), floor = 0.01f * bright * bright;
+  const auto middle = lit.begin() + ptrdiff_t(lit.size() / 2);
+  std::nth_element(lit.begin(), middle, lit.end());
+  const float shown = kMiddleGrey / std::max(*middle, FLT_MIN);
   const auto look_at_row = [&](int y) {
     for (int x = 0; x < int(width); ++x) {
       Near near;
@@ -49,7 +60,7 @@ std::vector<float> deviations(const std::vector<PixelNoise>& pixels, uint32_t wi
       const float variance =
           near.known > 0.0f ? near.variance / near.known : std::max(0.0f, near.mean_square / near.weight - mean * mean);
       const float square = unit == DeviationUnit::kLight   ? 1.0f
-                           : unit == DeviationUnit::kShown ? std::sqrt(level * level + floor)
+                           : unit == DeviationUnit::kShown ? std::sqrt(level * level + floor) / shown
                                                            : level * level + floor;
       found[size_t(y) * width + size_t(x)] = std::sqrt(variance / square);
     }
@@ -64,11 +75,9 @@ std::vector<float> deviations(const std::vector<PixelNoise>& pixels, uint32_t wi
 }
 
 std::vector<uint32_t> share_out(const std::vector<float>& noise, const std::vector<PixelNoise>& pixels, uint64_t budget,
-                                uint32_t most, uint32_t seed) {
+                                float worth, uint32_t most, uint32_t seed) {
   std::vector<uint32_t> counts(pixels.size(), 0);
-  float largest = 0.0f;
-  for (float d : noise) largest = std::max(largest, d);
-  if (!budget || !(largest > 0.0f)) return counts;
+  if (!budget) return counts;
   const auto wanted = [&](size_t p, float scale) {
     const float own = float(pixels[p].samples - pixels[p].extra);
     return std::clamp(noise[p] * scale - float(pixels[p].samples), 0.0f,
@@ -79,9 +88,9 @@ std::vector<uint32_t> share_out(const std::vector<float>& noise, const std::vect
     for (size_t p = 0; p < pixels.size(); ++p) sum += wanted(p, scale);
     return sum;
   };
-  float low = 0.0f, high = 1.0f / largest;
-  while (all(high) < double(budget) && high < 1e12f / largest) low = high, high *= 4.0f;
-  for (int i = 0; i < kHalvings; ++i) {
+  float low = 0.0f, high = worth;
+  if (all(high) <= double(budget)) low = high;
+  for (int i = 0; i < kHalvings && low < high; ++i) {
     const float middle = 0.5f * (low + high);
     (all(middle) <= double(budget) ? low : high) = middle;
   }
@@ -104,7 +113,8 @@ std::vector<PixelRequest> extra_requests(const Film& film, float extra) {
   std::vector<PixelRequest> requests;
   if (!(budget >= 1.0)) return requests;
   const std::vector<float> noise = deviations(pixels, film.width(), film.height(), DeviationUnit::kShown);
-  const std::vector<uint32_t> counts = share_out(noise, pixels, uint64_t(budget), kMostTimes, uint32_t(own));
+  const std::vector<uint32_t> counts = share_out(noise, pixels, uint64_t(budget),
+                                                 kWorth * extra * float(own / double(pixels.size())), kMostTimes, uint32_t(own));
   for (uint32_t y = f.y0; y < f.y1; ++y)
     for (uint32_t x = f.x0; x < f.x1; ++x) {
       const size_t p = size_t(y - f.y0) * film.width() + (x - f.x0);

@@ -137,6 +137,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
   if (carries) film.begin_asking();
   uint32_t caught_up = 0;
   uint32_t done = before;
+  uint64_t extra = 0;
   double in_passes = 0.0, at_last_publish = 0.0;
   for (uint32_t index = 0; !stop_; ++index) {
     PassPlan plan = plan_pass(options, index, done);
@@ -170,8 +171,11 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
     if (renderer.extra() > 0.0f && plan.step == 1) {
       work.extra = true;
       const int rounds = settings.viewport || index ? 1 : kExtraRounds;
-      for (int i = 1; i <= rounds && !stop_; ++i)
-        renderer.render(*scene_, extra_requests(film, renderer.extra() * float(i) / float(rounds)), film, work);
+      for (int i = 1; i <= rounds && !stop_; ++i) {
+        const std::vector<PixelRequest> noisy = extra_requests(film, renderer.extra() * float(i) / float(rounds));
+        for (const PixelRequest& request : noisy) extra += request.count;
+        renderer.render(*scene_, noisy, film, work);
+      }
       work.extra = false;
       if (stop_) break;
     }
@@ -189,6 +193,7 @@ uint32_t Session::render_passes(const RenderSettings& settings, Renderer& render
       const std::lock_guard lock(mutex_);
       film_step_ = plan.step;
       statistics_.samples = done;
+      if (done > before && renderer.extra() > 0.0f) extra_ = double(extra) / (double(pixels) * (done - before));
       if (noise.value >= 0.0f) statistics_.noise = noise;
       statistics_.seconds["render"] = in_passes;
       for (const auto& [name, value] : told.values) statistics_.method_values[name] = value;

@@ -266,7 +266,8 @@ def main() -> None:
     descriptor, folder = sys.argv[sys.argv.index("--") + 1 :][:2]
     answers = os.fdopen(int(descriptor), "w", buffering=1)
     problem = enable_addon()
-    answers.write(json.dumps({"version": bpy.app.version_string, "problem": problem}) + "\n")
+    native = getattr(sys.modules.get("afterglow._native"), "__file__", "")
+    answers.write(json.dumps({"version": bpy.app.version_string, "problem": problem, "module": native}) + "\n")
     for number, line in enumerate(sys.stdin):
         job = json.loads(line)
         try:

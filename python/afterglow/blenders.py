@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 SCRIPT = Path(__file__).with_name("blender_server.py")
+APART = ("PYTHONPATH", "AFTERGLOW_LIBRARY")  # name the module built here: a Blender takes the one made for it
 
 
 class Unavailable(Exception):
@@ -117,15 +118,17 @@ class Worker:
         self.folder = tempfile.TemporaryDirectory(prefix="afterglow_")
         self.log = Path(self.folder.name) / "log"
         reader, writer = os.pipe()
+        inherited = {name: value for name, value in os.environ.items() if name not in APART}
         with self.log.open("w") as sink:
             self.process = subprocess.Popen(
                 [*command, "--", str(writer), self.folder.name], stdin=subprocess.PIPE, stdout=sink, stderr=subprocess.STDOUT,
-                text=True, pass_fds=[writer], env={**os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})})
+                text=True, pass_fds=[writer], env={**inherited, "PYTHONUNBUFFERED": "1", **(environment or {})})
         os.close(writer)
         self.answers = os.fdopen(reader)
         hello = self._answer()
         self.version: str = hello["version"]
         self.problem: str = hello["problem"]
+        self.module: str = hello["module"]  # file of the native module that the add-on loaded; "" without the add-on
 
     @classmethod
     def of_debian(cls, *arguments: str) -> Worker:

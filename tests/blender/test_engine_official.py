@@ -137,3 +137,15 @@ def test_animation_failure_panels(official: Callable[..., dict[str, Any]]) -> No
 
 def test_every_kind_of_image(official: Callable[..., dict[str, Any]]) -> None:
     test_engine_images.check(official(test_engine_images.SCRIPT))
+
+
+def test_what_the_bench_measures_is_the_packaged_module(package: dict[str, Path], bpy_venv: Callable[[str], Path], library: Path,
+                                                        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the module built from source is on Python's path, as it is for `make bench`."""
+    from afterglow import blenders
+
+    bpy_venv("5.0")
+    monkeypatch.setenv("PYTHONPATH", str(library))
+    with blenders.Worker.of_official("5.0") as worker:
+        assert worker.problem == "" and library not in Path(worker.module).parents
+        assert Path(worker.module).is_relative_to(blenders.resources("5.0"))

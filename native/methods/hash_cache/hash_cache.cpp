@@ -141,8 +141,8 @@ MethodDescription describe() {
       "The light of light sources on diffuse surfaces comes from the cells, too: fewer rays, blurred shadows", "",
       false, 0.0, 1.0);
   add("hash_extra", "Extra Camera Samples",
-      "Samples beyond every pixel's own, for each of those one on average, that go where the picture is noisy: edges, "
-      "gloss",
+      "Samples beyond every pixel's own that go where the picture is noisy (edges, gloss), for each of those one on "
+      "average: at most so many, fewer where little is noisy",
       "", 2.0, 0.0, 16.0);
   add("hash_first", "First Samples",
       "Samples that the first picture of an empty cache takes at least, at full caching resolution: what it leaves, "

@@ -20,8 +20,8 @@ def points(values: Mapping[str, float]) -> list[tuple[float, float]]:
     return sorted((float(n), float(v)) for n, v in values.items())
 
 
-def quality(path: Details | None, single: Details | None) -> dict[str, str]:
-    """Figure 11: relMSE and MS-SSIM over samples a pixel."""
+def quality(path: Details | None, cached: Details | None, single: Details | None) -> dict[str, str]:
+    """Figure 11: relMSE and MS-SSIM over samples a pixel; `cached` has all from the cache along the camera path."""
     charts = {}
     for kind, name, file, log in (("errors", "relMSE", "relmse", True), ("similarity", "MS-SSIM", "ms_ssim", False)):
         lines = []
@@ -29,6 +29,8 @@ def quality(path: Details | None, single: Details | None) -> dict[str, str]:
                                       (path, "HashCache, camera path", "path tracing, camera path")):
             if details is not None:
                 lines += [chart.Line(ours, points(details[kind])), chart.Line(theirs, points(details["path_tracing"][kind]))]
+        if cached is not None:
+            lines.append(chart.Line("HashCache, camera path, all from the cache", points(cached[kind])))
         if lines:
             shown = [chart.Line(line.name, [(x, 1 - y) for x, y in line.points]) if not log else line for line in lines]
             charts[f"hash_cache_{file}.svg"] = chart.lines(
@@ -66,8 +68,9 @@ def charts(figures: list[dict[str, Any]]) -> dict[str, str]:
         found = (f["details"] for f in figures if f["figure"].startswith(beginning) and key in f["details"])
         return next(found, None)
 
-    made = quality(details("path-traced samples that 64 samples are worth, camera path", "similarity"),
-                   details("path-traced samples that 64 samples are worth, first frame", "similarity"))
+    worth = "path-traced samples that 64 samples are worth, "
+    made = quality(*(details(worth + name, "similarity")
+                     for name in ("camera path, direct", "camera path, all", "first frame")))
     for function, found in ((caching, details("reconstruction's time", "settings")), (density, details("density", "table"))):
         if found is not None:
             made |= function(found)
