@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint32_t kMostTimes = 64;  // samples beyond a pixel's own, for each of those
 constexpr float kMiddleGrey = 0.18f;
-constexpr float kWorth = 5.0f;       // of an `extra`: samples for each own one where one has a shown deviation of 1
+constexpr float kWorth = 5.0f;  // of an `extra`: samples for each own one where one has a shown deviation of 1
 constexpr int kHalvings = 24;
 
 /// Sums over 3 × 3 pixels with binomial weights.
@@ -33,14 +33,17 @@ std::vector<float> deviations(const std::vector<PixelNoise>& pixels, uint32_t wi
     if (!p.samples) continue;
     const float level = (p.sum + p.seen) / float(p.samples);
     total += level, ++known;
-    if (level > 0.0f) lit.push_back(level);
+    if (unit == DeviationUnit::kShown && level > 0.0f) lit.push_back(level);
   }
   std::vector<float> found(pixels.size(), 0.0f);
   if (!known || !(total > 0.0)) return found;
   const float bright = 2.0f * float(total / double(known)), floor = 0.01f * bright * bright;
-  const auto middle = lit.begin() + ptrdiff_t(lit.size() / 2);
-  std::nth_element(lit.begin(), middle, lit.end());
-  const float shown = kMiddleGrey / std::max(*middle, FLT_MIN);
+  float shown = 1.0f;
+  if (!lit.empty()) {
+    const auto middle = lit.begin() + ptrdiff_t(lit.size() / 2);
+    std::nth_element(lit.begin(), middle, lit.end());
+    shown = kMiddleGrey / std::max(*middle, FLT_MIN);
+  }
   const auto look_at_row = [&](int y) {
     for (int x = 0; x < int(width); ++x) {
       Near near;
@@ -113,8 +116,8 @@ std::vector<PixelRequest> extra_requests(const Film& film, float extra) {
   std::vector<PixelRequest> requests;
   if (!(budget >= 1.0)) return requests;
   const std::vector<float> noise = deviations(pixels, film.width(), film.height(), DeviationUnit::kShown);
-  const std::vector<uint32_t> counts = share_out(noise, pixels, uint64_t(budget),
-                                                 kWorth * extra * float(own / double(pixels.size())), kMostTimes, uint32_t(own));
+  const float worth = kWorth * extra * float(own / double(pixels.size()));
+  const std::vector<uint32_t> counts = share_out(noise, pixels, uint64_t(budget), worth, kMostTimes, uint32_t(own));
   for (uint32_t y = f.y0; y < f.y1; ++y)
     for (uint32_t x = f.x0; x < f.x1; ++x) {
       const size_t p = size_t(y - f.y0) * film.width() + (x - f.x0);

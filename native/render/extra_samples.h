@@ -14,7 +14,7 @@ namespace afterglow {
 /// Deviation of one sample of each pixel, in units of
 enum class DeviationUnit {
   kLight,    // luminance itself
-  kShown,    // the displayed value, whose slope is 1 / √light, if exposed so that the median of what is lit is 0.18
+  kShown,    // the displayed value (its slope is 1 / √light) of a picture whose median of what is lit is 0.18
   kRelative  // the relative error
 };
 /// Of a mean m kShown divides by (m² + 0.01 · (2 · image mean)²)^(1/4), kRelative by the square of that. Variances and

@@ -19,7 +19,8 @@ FRAMES, SAMPLES = 100, 64
 PATH_COUNTS = (1, 8, SAMPLES)
 MEASURED = (0, 24, 49, 74, 99)
 REFERENCE = 512  # samples of each half
-PATHS: dict[str, dict[str, Any]] = {", direct light per pixel": {}, ", all from the cache": {"hash_direct": True, "hash_cell": 1.0}}
+PATHS: dict[str, dict[str, Any]] = {", direct light per pixel": {},
+                                    ", all from the cache": {"hash_direct": True, "hash_cell": 1.0}}
 
 
 def similarity(image: Any, truth: list[Any]) -> float:
