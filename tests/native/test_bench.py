@@ -17,6 +17,7 @@ from afterglow.bench.foundation.kitchen import fewest
 from afterglow.bench.foundation.light_passes import DIVIDED, compare, describe, light_of, resolved
 from afterglow.bench.foundation.sync import staged
 from afterglow.bench.hash_cache.charts import charts
+from afterglow.bench.hash_cache.views import PATHS
 from afterglow.bench.instant_cache import charts as instant_charts
 from afterglow.bench.instant_cache import tables
 
@@ -204,6 +205,10 @@ def test_charts_of_the_hash_cache_are_drawn_from_what_was_measured() -> None:
     assert set(made) == {f"hash_cache_{n}.svg" for n in ("relmse", "ms_ssim", "caching", "updated", "density", "memory")}
     assert all(text.startswith("<svg") and text.count("<polyline") == 2 for name, text in made.items() if "updated" not in name)
     assert charts(figures[-1:]) == {}
+    paths = [{"figure": f"path-traced samples that 64 samples are worth, camera path{name}", "details": quality} for name in PATHS]
+    for backwards in (paths, paths[::-1]):  # which file is read first does not matter
+        text = charts(backwards)["hash_cache_relmse.svg"]
+        assert text.count("<polyline") == 3 and "camera path, all from the cache" in text
 
 
 def test_an_animation_costs_its_first_frame_and_what_the_others_take() -> None:
