@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 SCRIPT = Path(__file__).with_name("blender_server.py")
-APART = ("PYTHONPATH", "AFTERGLOW_LIBRARY")  # name the module built here: a Blender takes the one made for it
 
 
 class Unavailable(Exception):
@@ -118,7 +117,8 @@ class Worker:
         self.folder = tempfile.TemporaryDirectory(prefix="afterglow_")
         self.log = Path(self.folder.name) / "log"
         reader, writer = os.pipe()
-        inherited = {name: value for name, value in os.environ.items() if name not in APART}
+        # The caller's PYTHONPATH names the module built for its own Python: a Blender takes the one made for it.
+        inherited = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
         with self.log.open("w") as sink:
             self.process = subprocess.Popen(
                 [*command, "--", str(writer), self.folder.name], stdin=subprocess.PIPE, stdout=sink, stderr=subprocess.STDOUT,
@@ -136,8 +136,9 @@ class Worker:
 
     @classmethod
     def of_official(cls, version: str = "5.0", addon: bool = True) -> Worker:
+        """Of the packaged extension, whatever AFTERGLOW_LIBRARY names for the distribution's Blender."""
         environment = {"BLENDER_USER_RESOURCES": str(resources(version))} if addon else {}
-        return cls([str(official(version)), str(SCRIPT)], environment)
+        return cls([str(official(version)), str(SCRIPT)], {"AFTERGLOW_LIBRARY": "", **environment})
 
     def _answer(self, timeout: float | None = None) -> dict[str, Any]:
         if timeout is not None and not select.select([self.answers], [], [], timeout)[0]:

@@ -20,9 +20,10 @@ def worker(library: Path, root: Path):
         yield made
 
 
-def test_a_worker_renders_with_both_engines(worker, blend_files: Path) -> None:
+def test_a_worker_renders_with_both_engines(worker, library: Path, blend_files: Path) -> None:
     from afterglow import images
 
+    assert Path(worker.module).is_relative_to(library), "the module built for the distribution's Blender, where there are several"
     opened = worker.open(blend_files / "cornell_box.blend", 25)
     assert opened["resolution"] == [64, 64]
     pictures = []

@@ -141,11 +141,12 @@ def test_every_kind_of_image(official: Callable[..., dict[str, Any]]) -> None:
 
 def test_what_the_bench_measures_is_the_packaged_module(package: dict[str, Path], bpy_venv: Callable[[str], Path], library: Path,
                                                         monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where the module built from source is on Python's path, as it is for `make bench`."""
+    """Also where Python's path or AFTERGLOW_LIBRARY name the module built from source, as `make bench` does."""
     from afterglow import blenders
 
     bpy_venv("5.0")
     monkeypatch.setenv("PYTHONPATH", str(library))
+    monkeypatch.setenv("AFTERGLOW_LIBRARY", str(library))
     with blenders.Worker.of_official("5.0") as worker:
         assert worker.problem == "" and library not in Path(worker.module).parents
         assert Path(worker.module).is_relative_to(blenders.resources("5.0"))
