@@ -141,7 +141,7 @@ def test_every_kind_of_image(official: Callable[..., dict[str, Any]]) -> None:
 
 def test_what_the_bench_measures_is_the_packaged_module(package: dict[str, Path], bpy_venv: Callable[[str], Path], library: Path,
                                                         monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where Python's path or AFTERGLOW_LIBRARY name the module built from source, as `make bench` does."""
+    """Also where Python's path, as for `make bench`, or AFTERGLOW_LIBRARY names the module built from source."""
     from afterglow import blenders
 
     bpy_venv("5.0")
